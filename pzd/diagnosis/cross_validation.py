@@ -92,7 +92,16 @@ def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
 
 @dataclass(frozen=True, eq=False)
 class PredictionError:
-    """Prediction error of held-out tests, one entry per test, or per half of one that is alone at its voltage."""
+    """Prediction error of held-out tests, one entry per test, or per half of one that is alone at its voltage.
+
+    Examples
+    --------
+    Two tests of energy 100 N^2 each, predicted with squared residuals of 1 and 3 N^2:
+
+    >>> error = PredictionError.of_entries([0, 1], [(1.0, 100.0, 80.0, 0.0), (3.0, 100.0, 80.0, 0.0)])
+    >>> error.criterion, error.determination
+    (0.02, 0.975)
+    """
 
     records: tuple[int, ...]
     """Index of the record of each entry."""
@@ -189,7 +198,13 @@ def _error_is_larger(one: PredictionError, other: PredictionError, errors: float
 
 
 def standard_error(differences: Array) -> float:
-    """Compute the standard error of the mean of (n,) differences; 0 of a single one."""
+    """Compute the standard error of the mean of (n,) differences; 0 of a single one.
+
+    Examples
+    --------
+    >>> round(standard_error(np.array([1.0, 2.0, 3.0])), 4)
+    0.5774
+    """
     largest = float(np.max(np.abs(differences)))  # scaled by it, for the squares of a diverged simulation may overflow
     if differences.size < FEWEST_DIFFERENCES or largest == 0.0:
         return 0.0

@@ -273,14 +273,14 @@ MOST_REGIONS = 10
 """Regions reported, at most: what fits in one table of the report."""
 
 
-def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tuple[Region, ...]:
+def regions(checks: Sequence[ResidualCheck], unit: str, displacement_zero: float = 0.0) -> tuple[Region, ...]:
     """Find the regions in which the gap is denser than elsewhere, most telling first.
 
     Parameters
     ----------
     checks : records against the damper
     unit : of the control signal
-    zero : recorded displacement where that of `checks` is zero [m]
+    displacement_zero : recorded displacement where that of `checks` is zero [m]
 
     Returns
     -------
@@ -294,7 +294,7 @@ def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tu
     stroke = max(float(np.ptp(p["displacement"])) for p in points)
     labels: dict[str, list[Labels]] = {}
     for check, p in zip(checks, points, strict=True):
-        for axis, words in _labels(check, p, speed, stroke, unit, zero).items():
+        for axis, words in _labels(check, p, speed, stroke, unit, displacement_zero).items():
             labels.setdefault(axis, []).append(words)
     found: list[tuple[float, Region]] = []
     for parts in labels.values():
@@ -332,16 +332,16 @@ def _points(check: ResidualCheck) -> dict[str, Array]:
 
 
 def _labels(
-    check: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, zero: float
+    check: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, displacement_zero: float
 ) -> dict[str, Labels]:
     """Return by axis the (n,) region in words that each point belongs to; positions as recorded."""
     v, x, a = p["velocity"], p["displacement"], p["acceleration"]
     distance = 0.25 * stroke  # edges to two figures of it
-    sides = np.round([zero - distance, zero + distance], 1 - math.floor(math.log10(distance)))
+    sides = np.round([displacement_zero - distance, displacement_zero + distance], 1 - math.floor(math.log10(distance)))
     fast = _bands(np.abs(v), _rounded(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
     found = {
         "velocity": fast,
-        "position": _bands(x + zero, sides, "x", "m"),
+        "position": _bands(x + displacement_zero, sides, "x", "m"),
         "direction": np.where(v >= 0.0, "rebound (v > 0)", "compression (v < 0)"),
         "phase": np.where(v * a >= 0.0, "speeding up", "slowing down"),
     }

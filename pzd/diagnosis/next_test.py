@@ -32,7 +32,7 @@ POINTS = 400
 CYCLES = 2
 """Cycles that are simulated; the last is compared."""
 MANY_CYCLES = "ten"
-"""Cycles of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
+"""Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
 STEPS_HZ = 4.0
 """Changes of the voltage per cycle in the test that steps it."""
 SMALLEST_AMPLITUDE = 0.02
@@ -198,6 +198,11 @@ def rounded_down(value: float, error: float = ROUND_OFF) -> float:
     """Round a positive number down to three digits, never above it by more than its relative error.
 
     So 0.02 stays 0.02 though a difference gave 0.0199...9.
+
+    Examples
+    --------
+    >>> rounded_down(0.019999999999999997), rounded_down(1.2349)
+    (0.02, 1.23)
     """
     larger = value * (1.0 + error)
     digits = 2 - math.floor(math.log10(larger))

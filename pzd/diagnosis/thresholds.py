@@ -95,7 +95,7 @@ Reason: stops act over the last 10 to 30 % of the stroke, a soft rubber one over
 END_STOP_OTHER_SIDE = 0.1
 """Share of its force at one end of the stroke that a stop must reach at the other end.
 
-Reason: a stop at one end alone cannot be told from a stroke that is recorded off its middle; not tuned."""
+Reason: a stop at one end alone looks like a stroke that is recorded off its middle; not tuned."""
 HALVES_SIGNIFICANCE = 0.001
 """Probability by chance below which halves of the tests disagree about a parameter.
 

@@ -37,7 +37,7 @@ from pzd.blind.plan import PlannedCase, plan
 from pzd.config import RunConfig, load
 from pzd.damper.effect import Effect
 from pzd.damper.model import Damper
-from pzd.diagnosis import campaign, cross_validation, thresholds
+from pzd.diagnosis import cross_validation, gap, thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
@@ -62,7 +62,7 @@ IN_CONFIG = (
     *("adopt_bic", "rival_bic", "most_effects", "most_added"),
 )
 CHANCES = ("significance", "HALVES_SIGNIFICANCE", "CYCLE_CHANGE_SIGNIFICANCE")
-AFTER = ("verdict", "missed", "handed_on", "added_by_prediction", "trends_of_tests", "hypotheses.regression")
+AFTER = ("verdict", "cross_validation", "adoption", "hypotheses.regression")
 """Modules of pzd.diagnosis that act on a search that is over."""
 AFTER_IN_CONFIG = ("unexplained_share", "most_added")
 
@@ -122,12 +122,13 @@ class Kept:
             return (id(given),)
         if isinstance(given, Problem):
             rows = tuple(row.model_dump_json() for row in given.base)
-            rest = given.scales, given.largest_rate, given.reference, sorted(given.per_voltage)
+            rest = given.scales, given.largest_rate, given.reference_temperature, sorted(given.per_voltage)
             return (*map(self._said, given.observations), rows, repr(rest))
         if isinstance(given, FitResult):
-            return given.damper.model_dump_json(), given.effects, given.searched.tobytes(), repr(given.misfit)
-        arrays = given.compared, given.measured, given.weights, given.column_basis, given.shrink
-        return given.name, given.place, given.first, given.stride, *(array.tobytes() for array in arrays)
+            return given.damper.model_dump_json(), given.effects, given.optimum.tobytes(), repr(given.misfit)
+        nuisances = given.nuisances.inner, given.nuisances.covariance
+        arrays = given.sample_indices, given.compared, given.measured, given.weights, *nuisances
+        return given.name, given.base_row, given.initial_force, *(array.tobytes() for array in arrays)
 
 
 def keep_fits() -> None:
@@ -253,7 +254,7 @@ def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, f
     for name in names():
         for factor in (0.5, 2.0):
             with instead(name, factor, config.diagnose) as other:
-                checked = campaign not in users(name)
+                checked = gap not in users(name)
                 found = stands if acts_after(name) else searched(prepared, other, checked=checked)
                 answer = answered(found, other)
             outcomes[name, factor] = judged(answer)

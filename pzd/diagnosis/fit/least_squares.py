@@ -28,8 +28,8 @@ Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bi
 STIFFNESS_MARGIN = 2.0
 """Factor by which the search may exceed the largest rate k/C.
 
-Reason: room for an optimum at the limit that identify found; a stiffer element cannot be told from a rigid one by these
-samples."""
+Reason: a margin for an optimum at the limit that identify found; these samples do not distinguish a stiffer element
+from a rigid one."""
 PRIOR_DEVIATION = 1.5
 """Prior standard deviation of ln C and ln k about their starting values: fixes a row where the tests do not show it (C
 under an open relief valve, k of a soft drive), and nowhere else.

@@ -50,6 +50,14 @@ class MarginalisedNuisances:
 
     Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
                                                                             Source: Gaussian prior, marginal likelihood
+
+    Examples
+    --------
+    A nuisance that moves the first residual by three standard deviations of noise:
+
+    >>> nuisances = MarginalisedNuisances.from_columns(np.array([[3.0], [0.0]]))
+    >>> nuisances.marginalised(np.array([1.0, 1.0])).round(3).tolist()
+    [0.316, 1.0]
     """
 
     columns: Array | csr_array
@@ -244,7 +252,8 @@ MOST_HARMONICS = 80
 Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of the
 first, and `RESOLUTION` is no finer."""
 EQUAL_WEIGHT_DEVIATION = 0.05
-"""Residual of a plain element [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
+"""Residual of the element without effects [share of the peak, r.m.s.], by which criterion (4) is set against the wide
+priors of C and k.
 
 Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test shows. Not
 tuned."""

@@ -107,8 +107,8 @@ def _stepping(record: Record) -> NDArray[np.bool_]:
     steps = np.append(steps_of_voltage(record.voltage, size), False)
     if not steps.any():
         return steps
-    reach = int(np.ceil(NEAR_STEP * record.rate))
-    near = np.convolve(steps, np.ones(2 * reach + 2))[reach : reach + size]
+    width = int(np.ceil(NEAR_STEP * record.rate))
+    near = np.convolve(steps, np.ones(2 * width + 2))[width : width + size]
     beside: NDArray[np.bool_] = near > 0.5
     return beside
 

@@ -26,7 +26,7 @@ MOST_ALONE = 5
 CLASSES = 25
 """Classes of the partial residual plot for each voltage, of equal numbers of samples."""
 MOST_VOLTAGES = 5
-"""Most voltages told apart in the plot."""
+"""Most voltages shown separately in the plot."""
 
 
 def hypotheses(
@@ -132,7 +132,7 @@ def _partial_residual(
     return argument[test.counts], left[test.counts], component[test.counts]
 
 
-# --- Effect file of a hypothesis: a parallel force that the next diagnosis can be told to adopt
+# --- Effect file of a hypothesis: a parallel force that the next diagnosis can be forced to adopt
 
 
 OF_THE_CONTROL = "U "

@@ -99,6 +99,11 @@ def play(x: Array, half_width: float) -> Array:
     """Compute (n,) by how far the rod is ahead of what it drags behind a play of that half width [m].
 
     Equation: e_i = clip(e_(i-1) + x_i - x_(i-1), -r, r)     Source: Visintin 1994, Differential Models of Hysteresis
+
+    Examples
+    --------
+    >>> play(np.array([0.0, 1.0, 2.0, 1.5]), 1.0).tolist()
+    [0.0, 1.0, 1.0, 0.5]
     """
     ahead, found = 0.0, np.empty(x.size)
     for i, step in enumerate(np.diff(x, prepend=x[0]).tolist()):

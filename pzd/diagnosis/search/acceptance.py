@@ -109,7 +109,7 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
         if unknown.effect == effect and (unit := trivial_size(effect, unknown.parameter, force)) is not None:
             sizes.append((abs(unknown.value_in(fitted.damper)) / unit, LEVEL * error / unit))
-    if not sizes or max(size - reach for size, reach in sizes) >= 1.0:
+    if not sizes or max(size - width for size, width in sizes) >= 1.0:
         return None
     return MAY_BE_TEST_SCATTER if max(size for size, _ in sizes) >= 1.0 else WITHIN_TEST_SCATTER
 
@@ -181,7 +181,16 @@ def _halves_agree(
 
 @dataclass(frozen=True)
 class Detection:
-    """Estimated size of the gap that an effect would leave."""
+    """Estimated size of the gap that an effect would leave.
+
+    Examples
+    --------
+    >>> found = Detection(size=0.01, error=0.002, gain=25.0, shape_parameters=0)
+    >>> found.interval
+    'a gap of 1 (0.61 to 1.4) % of peak'
+    >>> round(found.log_odds(0.0025, 0.25), 1)
+    10.3
+    """
 
     size: float
     """Most likely, as a share of peak (r.m.s.); negative where the effect would have to act the other way."""
@@ -228,7 +237,7 @@ def detections(problem: Problem, before: FitResult, tried: Sequence[Candidate]) 
     tangent = _TangentSpace.at(problem, before)
     force = problem.scales.low_force
     searched = {
-        c.effect: told for c in tried if (told := detection_from_fit(c, force, tangent.gap(c.fitted.simulated)))
+        c.effect: found for c in tried if (found := detection_from_fit(c, force, tangent.gap(c.fitted.simulated)))
     }
     others = [library()[c.effect] for c in tried if c.effect not in searched]
     linear = [e for e in others if e.place != "material" or problem.pooled_temperatures() is problem]
