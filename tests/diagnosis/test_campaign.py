@@ -19,7 +19,7 @@ PLAIN = damper_of(TWO)
 @pytest.fixture
 def asked(rng: np.random.Generator) -> Callable[[int], Campaign]:
     """The same campaign, so many records at the same time."""
-    prepared = prepare(sines(PLAIN, rng, TWO))
+    prepared = prepare(sines(PLAIN, rng, TWO, cycles=4))
 
     def made(jobs: int) -> Campaign:
         return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig(), jobs)

@@ -135,7 +135,7 @@ def samples_of(observation: WeightedRecord) -> set[tuple[str, int]]:
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_no_sample_has_two_roles(rng: np.random.Generator, count: int) -> None:
-    records = tuple(road_record(rng, 10_000, f"road-{i}") for i in range(count))
+    records = tuple(road_record(rng, 6_000, f"road-{i}") for i in range(count))
     found = evidence(records, damper_of((0.0,)))
     compared = {
         part: {s for o in problem.observations for s in samples_of(o)}
