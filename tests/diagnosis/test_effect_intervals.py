@@ -47,12 +47,12 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[FitResult, float]:
 def share_inside(rng: np.random.Generator, pulled: float, errors: Callable[[FitResult], Array]) -> float:
     fits = [linear(rng, pulled) for _ in range(DRAWS)]
     return float(
-        np.mean([abs(miss) <= LEVEL * errors(fitted)[0] / fitted.unknowns[0].slope(0.0) for fitted, miss in fits])
+        np.mean([abs(miss) <= LEVEL * errors(fitted)[0] / fitted.unknowns[0].derivative(0.0) for fitted, miss in fits])
     )
 
 
 def by_noise_alone(fitted: FitResult) -> Array:
-    return np.sqrt(np.diag(fitted.covariance)[-1:]) * fitted.unknowns[0].slope(0.0)
+    return np.sqrt(np.diag(fitted.covariance)[-1:]) * fitted.unknowns[0].derivative(0.0)
 
 
 def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(rng: np.random.Generator) -> None:

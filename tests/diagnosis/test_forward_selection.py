@@ -201,8 +201,8 @@ def test_an_effect_that_is_not_searched_for_would_not_pay(
     whole = evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of(TWO)).whole
     before = fit(whole, (), whole.start())
     screened = {c.effect: c for c in searching.candidates(whole, before)}
-    monkeypatch.setattr(searching, "SLIGHT_PROMISE", -np.inf)
-    monkeypatch.setattr(searching, "WORTH_FITTING", -np.inf)
+    monkeypatch.setattr(searching, "LEAST_DROP_IN_GAP", -np.inf)
+    monkeypatch.setattr(searching, "SHARE_WORTH_FITTING", -np.inf)
     all_searched = searching.candidates(whole, before)
     assert all(c.searched for c in all_searched)
     left_out = [c for c in all_searched if not screened[c.effect].searched]

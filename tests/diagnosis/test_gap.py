@@ -147,7 +147,7 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap(rng: 
     (prepared,) = prepare((record,))
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
     with_jump, without = (predict(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
-    assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
+    assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.002  # visible from 0.0025
     assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
 
-import pzd.diagnosis.hypotheses
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
 from pzd.cli.text_tables import diagnosis_lines
 from pzd.damper.compiled.laws import declared
@@ -156,7 +155,7 @@ def bypass(bypass_records: tuple[Record, ...]) -> Diagnosed:
 def test_a_hypothesis_leaves_the_adopted_damper_unchanged(
     bypass: Diagnosed, bypass_records: tuple[Record, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pzd.diagnose.hypotheses.rows, "hypotheses", lambda *_: Hypotheses())
+    monkeypatch.setattr("pzd.diagnosis.stage.hypotheses", lambda *_: Hypotheses())
     without = diagnosed(bypass_records, forbid=all_but("gas_spring"))
     for name, one in (("with", bypass), ("without", without)):
         (tmp_path / name).mkdir()

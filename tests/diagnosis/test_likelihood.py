@@ -129,8 +129,8 @@ def road_record(rng: np.random.Generator, count: int, name: str) -> Record:
 
 def samples_of(observation: WeightedRecord) -> set[tuple[str, int]]:
     """The samples of the record that an observation is compared at."""
-    assert np.all(np.diff(observation.places) == 1)
-    return {(observation.name, int(i)) for i in observation.places[observation.compared]}
+    assert np.all(np.diff(observation.sample_indices) == 1)
+    return {(observation.name, int(i)) for i in observation.sample_indices[observation.compared]}
 
 
 @pytest.mark.parametrize("count", [1, 2])

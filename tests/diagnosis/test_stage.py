@@ -270,10 +270,10 @@ def test_a_play_is_found_in_the_unit_of_the_control_and_an_orifice_in_its_own(
     damper = damper.with_effect("orifice_quadratic", {"q": 900.0})
     names = {"piezo_hysteresis": 5.0, "orifice_quadratic": 900.0}
     unknowns: list[Any] = [
-        SimpleNamespace(effect=name, parameter=library()[name].parameters[0], of=lambda _, value=value: value)
+        SimpleNamespace(effect=name, parameter=library()[name].parameters[0], value_in=lambda _, value=value: value)
         for name, value in names.items()
     ]
-    monkeypatch.setattr("pzd.diagnosis.verdict.standard_errors", lambda _: (0.1, 10.0))
+    monkeypatch.setattr("pzd.diagnosis.stage.standard_errors", lambda _: (0.1, 10.0))
     selection = cast("Selection", SimpleNamespace(fitted=SimpleNamespace(damper=damper, unknowns=unknowns)))
     found = parameters_of(selection, control)
     assert (found["piezo_hysteresis"]["r"].value, found["piezo_hysteresis"]["r"].unit) == (5.0, unit)
