@@ -1,4 +1,4 @@
-"""`pzd peers` sets the damper handed on beside published models, from a config to the table."""
+"""`pzd peers` compares the adopted damper with published models, from a config to the table."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def row(model: str, W_s: float, R2: float | None, record: str | None = "r01", vo
     return PeerRow(setting=None, voltage_V=voltage, kept_back="test", record=record, model=model, W_s=W_s, R2=R2)
 
 
-def test_the_models_stand_side_by_side_a_line_a_test() -> None:
+def test_the_table_has_one_line_per_test_and_one_column_per_model() -> None:
     rows = [row("plain", 0.0201, 0.9771), row("kwok", 0.01, 0.99454), row("plain", 0.02, 0.98, None, None)]
     rows += [row("kwok", 0.03, None, None, None)]
     rows += [each.model_copy(update={"kept_back": "voltage", "record": None}) for each in rows[:2]]
@@ -83,7 +83,7 @@ def test_the_models_stand_side_by_side_a_line_a_test() -> None:
     ]
 
 
-def test_without_a_test_kept_back_there_is_nothing_to_compare(
+def test_without_a_held_out_test_there_is_nothing_to_compare(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = project(tmp_path, monkeypatch)
@@ -92,7 +92,7 @@ def test_without_a_test_kept_back_there_is_nothing_to_compare(
     assert not (tmp_path / "runs" / "first" / "peers").exists()
 
 
-def test_the_knee_law_is_refused_with_what_to_do() -> None:
+def test_the_knee_law_is_refused_with_a_remedy() -> None:
     law = LawRow(setting=None, law="knee", tests=4, W_s_bingham=0.1, W_s_knee=0.01, reason="it predicts better")
     plain = Damper(base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6),))
     identified = Identified((), (), knees=Knees(laws=(law,)))

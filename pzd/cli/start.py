@@ -92,7 +92,7 @@ def _effect_as_data(effect: Effect) -> dict[str, Any]:
 
 def _propose(run: Path, out: Path | None, output: Output) -> int:
     """Write the best hypothesis of a run as an effect file, over none that is there."""
-    from pzd.diagnosis.hypotheses.summary import proposal_of
+    from pzd.diagnosis.hypotheses import proposal_of
     from pzd.own_effects import VARIABLE, own_folder
     from pzd.pipeline.run_summary import summary_of
     from pzd.schema.errors import ConfigError

@@ -1,8 +1,8 @@
-"""What a damper predicts of whole tests, and of whole voltages, that were kept back from its fit.
+"""Cross-validation: prediction of whole tests, and of whole voltages, that were held out of the fit.
 
-Cross-validation: the tests are dealt into folds, the damper is fitted anew without each fold and predicts the tests in
-it; nothing is fitted to a kept-back test, its own offset, gain and delay included. A test that is alone at its voltage
-is parted, for without it nothing would be known there; that is weak evidence.
+The tests are assigned to folds; the damper is refitted without each fold and predicts the tests in it. Nothing is
+fitted to a held-out test, its own offset, gain and delay included. A test that is alone at its voltage is divided into
+halves, for without it nothing would be known there; that is weak evidence.
 """
 
 from __future__ import annotations
@@ -14,70 +14,71 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.artefacts import HeldOutTest, HeldOutVoltage, Prediction
+from pzd.artefacts import KeptBack, LeftOut, Prediction
 from pzd.damper.material import by_voltage, with_rows
 from pzd.damper.model import Damper
-from pzd.diagnosis.campaign import Campaign
-from pzd.diagnosis.data import TRAINING, Prepared, Split
-from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
-from pzd.diagnosis.fit.likelihood import record_likelihood, unweighted
-from pzd.diagnosis.fit.parameters import Problem
-from pzd.diagnosis.fit.prediction import counted, predicted_force
-from pzd.diagnosis.search.evidence import evidence_of
-from pzd.diagnosis.thresholds import PREDICTS_WORSE, WORSE_BETWEEN
+from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
+from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit
+from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
+from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
+from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.thresholds import INTERPOLATION_ERROR_RATIO, PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
-from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
+from pzd.signals.nuisance import NuisanceConfig, columns_of
 
-# ----------------------------------------------------------------------------------------------------
-# The tests of one setting dealt into folds, each of which is kept back once.
+# --- Folds: each test is held out once
 
 
-FOLDS = 5
-"""Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""
+FOLDS_BY_VOLTAGE = 5
+"""Folds over which the tests of each voltage are spread.
+
+Reason: about a fifth of the tests is held out at a time: enough is left to fit, and the refits stay few."""
 PARTS = 2
 """Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Which tests stand at which voltage, and which samples each fold keeps back."""
+    """Which tests belong to which voltage, and which samples each fold holds out."""
 
     groups: tuple[tuple[int, ...], ...]
-    """The records of each voltage, and those whose voltage moves."""
+    """Indices of the records at each voltage, and of those whose voltage moves."""
     voltages: tuple[float | None, ...]
-    """Of the groups [V], 0 for a damper without; None where it moves."""
+    """Voltage of each group [V], 0 for a damper without a control signal; None where it moves."""
     folds: tuple[tuple[Mask, ...], ...]
-    """For every fold one mask (n,) a record: the samples that are kept back."""
+    """Held-out samples of each fold, one mask (n,) per record."""
 
 
-def deal(prepared: Sequence[Prepared], plain: Damper) -> Folds:
-    """Every voltage dealt by itself, so that each fold takes a bit of each; a test alone at its voltage in halves.
+def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
+    """Assign the tests of each voltage to folds in turn, so that each fold holds out some tests of each voltage.
 
     Parameters
     ----------
-    prepared : the records of one setting
-    plain : the damper, whose base rows say which voltages there are
+    prepared : records of one setting
+    baseline : damper whose base rows give the voltages
     """
-    nodes = [voltage for voltage, _ in by_voltage(plain.base)]
+    nodes = [voltage for voltage, _ in by_voltage(baseline.base)]
     members: dict[int, list[int]] = {}
     for i, p in enumerate(prepared):
         own = p.record.median_voltage() or 0.0
         members.setdefault(int(np.argmin([abs(v - own) for v in nodes])) if p.constant else -1, []).append(i)
     groups = tuple(tuple(sorted(found, key=lambda i: prepared[i].record.name)) for found in members.values())
     voltages = tuple(None if node < 0 else nodes[node] for node in members)
-    folds = tuple(tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in prepared) for _ in range(FOLDS))
+    sizes = [p.record.time.size for p in prepared]
+    folds = tuple(tuple(np.zeros(n, dtype=np.bool_) for n in sizes) for _ in range(FOLDS_BY_VOLTAGE))
     for turn, group in enumerate(groups):
         for place, i in enumerate(group):
             if len(group) > 1:
-                folds[(turn + place) % min(FOLDS, max(len(group), PARTS))][i][:] = True
+                folds[(turn + place) % min(FOLDS_BY_VOLTAGE, max(len(group), PARTS))][i][:] = True
             else:
                 for part, mask in enumerate(_halves(prepared[i])):
-                    folds[(turn + part) % FOLDS][i][:] = mask
+                    folds[(turn + part) % FOLDS_BY_VOLTAGE][i][:] = mask
     return Folds(groups, voltages, tuple(fold for fold in folds if any(mask.any() for mask in fold)))
 
 
-def _halves(prepared: Prepared) -> tuple[Mask, Mask]:
-    """(n,) the first and the second half of a record, by whole cycles where it has two or more."""
+def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
+    """Return masks (n,) of the first and second half of a record, by whole cycles where it has two or more."""
     time, run = prepared.record.time, prepared.cycles
     if run is None or run.count < PARTS:
         first = np.arange(time.size) < time.size // PARTS
@@ -86,25 +87,45 @@ def _halves(prepared: Prepared) -> tuple[Mask, Mask]:
     return first, ~first
 
 
-# ----------------------------------------------------------------------------------------------------
-# What a damper misses of kept-back tests, and whether another one misses less beyond chance.
+# --- Prediction errors and their comparison
 
 
 @dataclass(frozen=True, eq=False)
-class Missed:
-    """What a damper misses of kept-back tests, an entry a test, or a part of one that is alone at its voltage."""
+class PredictionError:
+    """Prediction error of held-out tests, one entry per test, or per half of one that is alone at its voltage.
 
-    record: tuple[int, ...]
-    """Which record an entry is of."""
+    Examples
+    --------
+    Two tests of energy 100 N^2 each, predicted with squared residuals of 1 and 3 N^2:
+
+    >>> error = PredictionError.of_entries([0, 1], [(1.0, 100.0, 80.0, 0.0), (3.0, 100.0, 80.0, 0.0)])
+    >>> error.criterion, error.determination
+    (0.02, 0.975)
+    """
+
+    records: tuple[int, ...]
+    """Index of the record of each entry."""
     error: Array
-    """(t,) sum of the squared residual [N^2]."""
+    """(t,) sum of squared residuals [N^2]."""
     energy: Array
-    """(t,) sum of the squared force [N^2]."""
+    """(t,) sum of squared forces [N^2]."""
     spread: Array
-    """(t,) sum of the squared force about its mean over the entry [N^2]."""
-    limit: Array
-    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap, and beside them what offset,
-    gain and delay of a test may come to where its other half was fitted."""
+    """(t,) sum of squared deviations of the force from its mean over the entry [N^2]."""
+    negligible: Array
+    """(t,) error that does not count [N^2]: a residual of the visible size at every sample, and where the other half
+    of the test was fitted also what offset, gain and delay of the test may contribute."""
+
+    @classmethod
+    def of_entries(cls, records: Sequence[int], entries: Sequence[tuple[float, ...]]) -> PredictionError:
+        """Collect entries (error, energy, spread, negligible) of some records."""
+        return cls(tuple(records), *np.array(entries, dtype=np.float64).reshape(-1, 4).T)
+
+    @classmethod
+    def concatenated(cls, parts: Sequence[PredictionError]) -> PredictionError:
+        """Join the entries of several folds."""
+        names = ("error", "energy", "spread", "negligible")
+        sums = (np.concatenate([np.zeros(0), *(getattr(p, name) for p in parts)]) for name in names)
+        return cls(tuple(i for part in parts for i in part.records), *sums)
 
     @property
     def criterion(self) -> float | None:
@@ -112,42 +133,38 @@ class Missed:
 
         Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
         """
-        return float(self.error.sum() / self.energy.sum()) if self.record else None
+        return float(self.error.sum() / self.energy.sum()) if self.records else None
 
     @property
     def determination(self) -> float | None:
-        """R2 pooled over the entries, each about its own mean; None without any, or where no force moves.
+        """R2 pooled over the entries, each about its own mean; None without any, or where the force is constant.
 
         Equation: 1 - sum (F - F_sim)^2 / sum (F - mean F)^2                      Source: coefficient of determination
         """
         return float(1.0 - self.error.sum() / self.spread.sum()) if self.spread.sum() > 0.0 else None
 
-    def less_than(self, other: Missed) -> bool:
-        """Whether less is missed than by another damper, all tests together, by what can be seen."""
-        return float((other.error - self.error).sum()) > float(self.limit.sum())
+    def visibly_below(self, other: PredictionError) -> bool:
+        """Whether the total error is smaller than another one by a visible amount."""
+        return float((other.error - self.error).sum()) > float(self.negligible.sum())
 
-    def of(self, wanted: Sequence[int]) -> Missed:
-        """The entries of some records."""
-        kept = np.isin(self.record, wanted)
-        records = tuple(r for r, k in zip(self.record, kept, strict=True) if k)
-        return Missed(records, self.error[kept], self.energy[kept], self.spread[kept], self.limit[kept])
-
-
-FEWEST = 2
-"""Differences of which the scatter is known, at least."""
-NOTHING_MISSED = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
-"""Where no test was kept back."""
+    def of_records(self, wanted: Sequence[int]) -> PredictionError:
+        """Select the entries of some records."""
+        kept = np.isin(self.records, wanted)
+        records = tuple(r for r, k in zip(self.records, kept, strict=True) if k)
+        return PredictionError(records, self.error[kept], self.energy[kept], self.spread[kept], self.negligible[kept])
 
 
-def joined(parts: Sequence[Missed]) -> Missed:
-    """What is missed of several folds, one behind the other."""
-    if not parts:
-        return NOTHING_MISSED
-    sums = (np.concatenate([getattr(p, name) for p in parts]) for name in ("error", "energy", "spread", "limit"))
-    return Missed(tuple(i for part in parts for i in part.record), *sums)
+FEWEST_DIFFERENCES = 2
+"""Fewest differences of which a standard error can be computed."""
 
 
-def worse(one: Missed, other: Missed) -> bool:
+def squared_sums(force: Array, residual: Array) -> tuple[float, float, float]:
+    """Return the sums of squares of residual, force and force about its mean, from (n,) samples [N]."""
+    about_mean = force - force.mean()
+    return float(residual @ residual), float(force @ force), float(about_mean @ about_mean)
+
+
+def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts worse than another: visibly, and beyond chance however few the tests.
 
     Equation: mean d > t s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one, P(t_(n-1) < t) = P(z < 2)
@@ -155,299 +172,312 @@ def worse(one: Missed, other: Missed) -> bool:
     """
     from scipy.special import ndtr, stdtrit
 
-    tests = len(one.record)
-    return _misses_more(one, other, float(stdtrit(tests - 1, ndtr(PREDICTS_WORSE))) if tests > 1 else 0.0)
+    tests = len(one.records)
+    return _error_is_larger(
+        one, other, float(stdtrit(tests - 1, ndtr(PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
+    )
 
 
-def better(one: Missed, other: Missed) -> bool:
+def predicts_better(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts better than another: visibly, and by two standard errors.
 
-    Of few tests that is less than `worse` asks for: what is added by it is no name, and nothing speaks against it.
+    Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
+    verdict, and nothing speaks against it.
     """
-    return _misses_more(other, one, PREDICTS_WORSE)
+    return _error_is_larger(other, one, PREDICTION_STANDARD_ERRORS)
 
 
-def _misses_more(one: Missed, other: Missed, errors: float) -> bool:
-    """Whether one damper misses visibly more than another, and by so many standard errors of the paired differences."""
-    if not one.record:
+def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
+    """Whether one error is visibly larger, and by so many standard errors of the paired differences."""
+    if not one.records:
         return False
     difference = (one.error - other.error) / one.energy
-    if not np.isfinite(difference).all():  # a path that was lost misses more than any other
+    if not np.isfinite(difference).all():  # a diverged simulation is worse than any other
         return not np.isfinite(one.error).all() and bool(np.isfinite(other.error).all())
-    return other.less_than(one) and float(difference.mean()) > errors * standard_error(difference)
+    return other.visibly_below(one) and float(difference.mean()) > errors * standard_error(difference)
 
 
 def standard_error(differences: Array) -> float:
-    """Of the mean of (n,) differences, however large: their squares may overflow; 0 of a single one."""
-    largest = float(np.max(np.abs(differences)))
-    if differences.size < FEWEST or largest == 0.0:
+    """Compute the standard error of the mean of (n,) differences; 0 of a single one.
+
+    Examples
+    --------
+    >>> round(standard_error(np.array([1.0, 2.0, 3.0])), 4)
+    0.5774
+    """
+    largest = float(np.max(np.abs(differences)))  # scaled by it, for the squares of a diverged simulation may overflow
+    if differences.size < FEWEST_DIFFERENCES or largest == 0.0:
         return 0.0
     return largest * float(np.std(differences / largest, ddof=1) / np.sqrt(differences.size))
 
 
-def much_worse(one: Missed, other: Missed) -> bool:
-    """Whether one damper predicts tests of a voltage left out visibly worse than another one, and by half or more."""
-    return other.less_than(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (other.criterion or 0.0)
+def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
+    """Whether one damper predicts the tests of a left-out voltage visibly worse than another, and by half or more."""
+    return other.visibly_below(one) and (one.criterion or 0.0) > INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Cross-validation of a damper
 
 
-EVALUATIONS = 6
-"""Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
+REFIT_EVALUATIONS = 6
+"""Evaluations of a refit without one fold.
+
+Reason: it begins at the optimum of all tests, which a fifth of them moves little."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
-"""The damper fitted to all but what is kept back; None where nothing is left."""
+"""Gives the damper refitted to all but the held-out samples; None where nothing is left."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trials:
-    """The tests of one setting, dealt into folds."""
+class CrossValidation(Folds):
+    """The tests of one setting in folds, and the prediction error of any damper on them."""
 
     campaign: Campaign
-    """Every sample of it may be fitted."""
-    plain: Damper
-    """As identify found it, with all the tests."""
+    """All of its samples may be fitted."""
+    baseline: Damper
+    """As identify found it from all tests."""
     visible: float
-    """A gap (r.m.s.) below this share of a test's peak force counts as nothing."""
-    groups: tuple[tuple[int, ...], ...]
-    """The records of each voltage, and those whose voltage moves."""
-    voltages: tuple[float | None, ...]
-    """Of the groups [V], 0 for a damper without; None where it moves."""
-    folds: tuple[tuple[Mask, ...], ...]
+    """A gap (r.m.s.) below this share of a test's peak force does not count."""
 
     @property
-    def nothing(self) -> tuple[Mask, ...]:
-        """(n,) a record: no sample is kept back."""
+    def no_samples(self) -> tuple[Mask, ...]:
+        """Masks (n,), one per record, that hold out no sample."""
         return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.campaign.prepared)
 
-    def plain_missed(self) -> Missed:
-        """What the plain damper misses, fitted without each fold by criterion (4), as identify fits it."""
-        return self._missed(self._by_criterion(self.plain))
+    def baseline_error(self) -> PredictionError:
+        """Compute the held-out prediction error of the baseline, refitted by criterion (4) as identify fits it."""
+        return self._fold_errors(self._refit_by_criterion(self.baseline))
 
-    def missed(self, damper: Damper) -> Missed:
-        """What a damper misses, T0, C, k and its effects fitted without each fold, from where they are."""
-        return self._missed(self._by_likelihood(damper))
+    def held_out_error(self, damper: Damper) -> PredictionError:
+        """Compute the held-out prediction error of a damper, refitted by the likelihood without each fold."""
+        return self._fold_errors(self._refit_by_likelihood(damper))
 
-    def missed_by_criterion(self, damper: Damper) -> Missed:
-        """What a damper misses, all of it fitted without each fold by criterion (4), as identify fits the plain one."""
-        whole = self.fitted_by_criterion(damper, self.nothing)
-        return self._missed(self._by_criterion(whole[1].damper if whole else damper))
+    def error_by_criterion(self, damper: Damper) -> PredictionError:
+        """Compute the held-out prediction error of a damper, refitted by criterion (4) without each fold."""
+        whole = self.fit_by_criterion(damper, self.no_samples)
+        return self._fold_errors(self._refit_by_criterion(whole[1].damper if whole else damper))
 
     @cached_property
-    def plain_missed_between(self) -> Missed:
-        """What the plain damper misses of every voltage between two others, fitted by criterion (4) without it."""
-        return self.missed_between(self.plain, by_criterion=True)
+    def baseline_interpolation_error(self) -> PredictionError:
+        """Interpolation error of the baseline, refitted by criterion (4)."""
+        return self.interpolation_error(self.baseline, by_criterion=True)
 
-    def missed_between(self, damper: Damper, *, by_criterion: bool) -> Missed:
-        """What a damper misses of every voltage between two others, fitted without that voltage.
+    def interpolation_error(self, damper: Damper, *, by_criterion: bool) -> PredictionError:
+        """Compute the prediction error at every voltage between two others, refitted without that voltage.
 
         Parameters
         ----------
-        damper : the one handed on, or tried
-        by_criterion : whether it is fitted by criterion (4), else by the likelihood
+        damper : with the effects to be tried
+        by_criterion : whether to refit by criterion (4) instead of the likelihood
         """
-        refit = self._by_criterion(damper) if by_criterion else self._by_likelihood(damper)
-        return joined([self._without_voltage(i, refit) for i in self.between()])
+        refit = self._refit_by_criterion(damper) if by_criterion else self._refit_by_likelihood(damper)
+        return PredictionError.concatenated([self._error_without_voltage(i, refit) for i in self.interior_groups()])
 
-    def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
-        """A damper, its effects too, fitted by criterion (4) to all but what is kept back, and to what it is fitted.
+    def fit_by_criterion(self, damper: Damper, held_out: Sequence[Mask]) -> tuple[Problem, FitResult] | None:
+        """Fit a damper with its effects by criterion (4) to all but the held-out samples.
 
-        None where nothing is left.
+        Returns
+        -------
+        the least-squares problem and its solution; None where nothing is left to fit
         """
-        problem = self._unweighted(damper)(kept_back)
+        problem = self._criterion_problem(damper)(held_out)
         return None if problem is None else (problem, _fit(problem, damper))
 
-    def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
-        """The voltages [V] at which one damper predicts worse than another; all where only the whole shows it."""
-        return self._where(worse, one, other)
+    def worse_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
+        """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it."""
+        return self._voltages_where(predicts_worse, one, other)
 
-    def better(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
-        """The voltages [V] at which one damper predicts better than another; all where only the whole shows it."""
-        return self._where(better, one, other)
+    def better_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
+        """Return the voltages [V] at which one damper predicts better; all where only the whole shows it."""
+        return self._voltages_where(predicts_better, one, other)
 
-    def _where(self, holds: Callable[[Missed, Missed], bool], one: Missed, other: Missed) -> tuple[float | None, ...]:
+    def _voltages_where(
+        self, holds: Callable[[PredictionError, PredictionError], bool], one: PredictionError, other: PredictionError
+    ) -> tuple[float | None, ...]:
         groups = zip(self.voltages, self.groups, strict=True)
-        found = tuple(v for v, group in groups if holds(one.of(group), other.of(group)))
+        found = tuple(v for v, group in groups if holds(one.of_records(group), other.of_records(group)))
         return found or (self.voltages if holds(one, other) else ())
 
-    def worse_between(self, between: Missed) -> tuple[float | None, ...]:
-        """The voltages [V] between others at which a damper misses visibly and much more than the plain one does."""
-        pairs = {i: (each.of(self.groups[i]) for each in (between, self.plain_missed_between)) for i in self.between()}
-        return tuple(self.voltages[i] for i, pair in pairs.items() if much_worse(*pair))
+    def interpolates_worse_at(self, error: PredictionError) -> tuple[float | None, ...]:
+        """Return the voltages [V] between others where the interpolation error is much larger than the baseline's."""
+        both = error, self.baseline_interpolation_error
+        pairs = {i: [each.of_records(self.groups[i]) for each in both] for i in self.interior_groups()}
+        return tuple(self.voltages[i] for i, pair in pairs.items() if interpolates_much_worse(*pair))
 
-    def between(self) -> tuple[int, ...]:
-        """The groups whose voltage lies between two others."""
+    def interior_groups(self) -> tuple[int, ...]:
+        """Return the groups whose voltage lies between two others."""
         constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
         return tuple(i for _, i in constant[1:-1])
 
-    def prediction(self, plain: Missed, missed: Missed, between: Missed) -> Prediction | None:
-        """The figures of diagnosis.json; None where no test could be kept back.
+    def prediction(
+        self, baseline: PredictionError, final: PredictionError, interpolation: PredictionError
+    ) -> Prediction | None:
+        """Return the figures of diagnosis.json; None where no test could be held out.
 
         Parameters
         ----------
-        plain, missed : what the plain damper and the one handed on miss of kept-back tests
-        between : what the one handed on misses of the voltages between others
+        baseline, final : held-out errors of the baseline and of the adopted damper
+        interpolation : interpolation error of the adopted damper
         """
-        whole = plain.criterion, missed.criterion
-        if whole[0] is None or whole[1] is None:
+        if baseline.criterion is None or final.criterion is None:
             return None
-        by, controlled = [], any(row.voltage_V is not None for row in self.plain.base)
-        for voltage, group in zip(self.voltages, self.groups, strict=True):
-            for i in group:
-                simple, handed = plain.of([i]).criterion, missed.of([i]).criterion
-                if simple is not None and handed is not None:
-                    name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
-                    R2 = {"R2_plain": plain.of([i]).determination, "R2": missed.of([i]).determination}
-                    by.append(HeldOutTest(record=name, voltage=at, W_s_plain=simple, W_s=handed, **R2))
-        left_out = [self._left_out(i, between) for i in self.between()]
+        tests, controlled = [], any(row.voltage_V is not None for row in self.baseline.base)
+        for voltage, i in ((v, i) for v, group in zip(self.voltages, self.groups, strict=True) for i in group):
+            before, after = baseline.of_records([i]), final.of_records([i])
+            if before.criterion is not None and after.criterion is not None:
+                tests.append(
+                    KeptBack(
+                        record=self.campaign.prepared[i].record.name,
+                        voltage=voltage if controlled else None,
+                        W_s_plain=before.criterion,
+                        W_s=after.criterion,
+                        R2_plain=before.determination,
+                        R2=after.determination,
+                    )
+                )
+        left_out = [self._left_out(i, interpolation) for i in self.interior_groups()]
         return Prediction(
             hold_out=self._hold_out(),
-            by=tuple(sorted(by, key=lambda each: each.record)),
-            W_s_plain=whole[0],
-            W_s=whole[1],
+            by=tuple(sorted(tests, key=lambda each: each.record)),
+            W_s_plain=baseline.criterion,
+            W_s=final.criterion,
             left_out_voltages=tuple(each for each in left_out if each is not None),
         )
 
     def _hold_out(self) -> HoldOut:
-        kinds = {self._kind(group) for group in self.groups}
+        """Return what the folds hold out: whole tests, or parts of tests that are alone at their voltage."""
+        kinds: set[HoldOut] = {"tests"} if any(len(group) > 1 for group in self.groups) else set()
+        for i in self._lone_tests:
+            kinds.add("segments" if self.campaign.prepared[i].cycles is None else "cycles")
         return kinds.pop() if len(kinds) == 1 else "mixed"
 
-    def _kind(self, group: Sequence[int]) -> HoldOut:
-        if len(group) > 1:
-            return "tests"
-        return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
-
-    def _left_out(self, group: int, between: Missed) -> HeldOutVoltage | None:
-        """One voltage predicted from those around it."""
-        voltage = self.voltages[group]
-        plain, other = (each.of(self.groups[group]).criterion for each in (self.plain_missed_between, between))
-        if voltage is None or plain is None or other is None:
+    def _left_out(self, group: int, interpolation: PredictionError) -> LeftOut | None:
+        voltage, both = self.voltages[group], (self.baseline_interpolation_error, interpolation)
+        before, after = (each.of_records(self.groups[group]).criterion for each in both)
+        if voltage is None or before is None or after is None:
             return None
-        return HeldOutVoltage(voltage=voltage, W_s_plain=plain, W_s=other)
+        return LeftOut(voltage=voltage, W_s_plain=before, W_s=after)
 
-    def _without_voltage(self, group: int, fitted: _Refit) -> Missed:
-        """What is missed of one voltage, with neither it nor any test fitted of which the voltage moves."""
+    def _error_without_voltage(self, group: int, refit: _Refit) -> PredictionError:
+        """Compute the error at one voltage, refitted without it and without the tests whose voltage moves."""
         mine = self.groups[group]
         moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
         sizes = [p.record.time.size for p in self.campaign.prepared]
-        found = fitted(tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes)))
-        asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
-        return NOTHING_MISSED if found is None else self._of_fold(found, asked)
+        damper = refit(tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes)))
+        return self._error_of_fold(damper, tuple(np.full(n, i in mine) for i, n in enumerate(sizes)))
 
-    def _missed(self, fitted: _Refit) -> Missed:
-        def of_fold(kept_back: Sequence[Mask]) -> Missed:
-            found = fitted(kept_back)
-            return NOTHING_MISSED if found is None else self._of_fold(found, self._known(found, kept_back))
+    def _fold_errors(self, refit: _Refit) -> PredictionError:
+        def of_fold(held_out: Sequence[Mask]) -> PredictionError:
+            damper = refit(held_out)
+            return self._error_of_fold(damper, () if damper is None else self._predictable(damper, held_out))
 
-        return joined(self.campaign.each(of_fold, self.folds))
+        return PredictionError.concatenated(self.campaign.parallel_map(of_fold, self.folds))
 
-    def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
-        """What is kept back of the voltages for which some test was left to fit."""
+    def _predictable(self, damper: Damper, held_out: Sequence[Mask]) -> list[Mask]:
+        """Return the held-out samples at those voltages for which some test was left to fit."""
         constant = [voltage for voltage in self.voltages if voltage is not None]
-        # By the nearest: a voltage is that of one of its rows, and rows of other temperatures have it not quite.
+        # By the nearest: rows of several temperatures have nearly, not exactly, the voltage of their group.
         fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in by_voltage(damper.base)}
         lost = {
             i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
         }
-        return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(kept_back)]
+        return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(held_out)]
 
     @property
-    def _alone(self) -> frozenset[int]:
-        """The tests that are alone at their voltage.
+    def _lone_tests(self) -> frozenset[int]:
+        """Tests that are alone at their voltage.
 
-        Either half has the offset, gain and delay of the other, which T0, C and k of that voltage take up and an
-        effect that all voltages share does not: what these may come to by their priors says nothing.
+        Either half has the offset, gain and delay of the other, which T0, C and k of that voltage absorb and an effect
+        shared by all voltages does not: what these may contribute within their priors says nothing.
         """
         return frozenset(group[0] for group in self.groups if len(group) == 1)
 
-    def _of_fold(self, damper: Damper, kept_back: Sequence[Mask]) -> Missed:
-        records, rows = [], []
-        for i, (p, mask) in enumerate(zip(self.campaign.prepared, kept_back, strict=True)):
-            kept = mask & counted(p)
+    def _error_of_fold(self, damper: Damper | None, held_out: Sequence[Mask]) -> PredictionError:
+        """Compute the error of a refitted damper on the held-out samples; empty where there is no damper."""
+        records, entries = list[int](), list[tuple[float, ...]]()
+        if damper is None:
+            return PredictionError.of_entries(records, entries)
+        for i, (p, mask) in enumerate(zip(self.campaign.prepared, held_out, strict=True)):
+            kept = mask & comparable_samples(p)
             if not kept.any():
                 continue
             force = p.record.force[kept]
             residual = force - predicted_force(damper, p)[kept]
-            peak = float(np.max(np.abs(p.record.force)))
-            limit = residual.size * (self.visible * peak) ** 2
-            if i in self._alone:
-                limit += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
+            negligible = residual.size * (self.visible * float(np.max(np.abs(p.record.force)))) ** 2
+            if i in self._lone_tests:
+                negligible += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
-            about_mean = force - force.mean()
-            rows.append((residual @ residual, force @ force, about_mean @ about_mean, limit))
-        columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
-        return Missed(tuple(records), *columns)
+            entries.append((*squared_sums(force, residual), negligible))
+        return PredictionError.of_entries(records, entries)
 
-    def _by_likelihood(self, damper: Damper) -> _Refit:
+    def _refit_by_likelihood(self, damper: Damper) -> _Refit:
         problem = evidence_of(self.campaign, damper).whole
-        return lambda kept_back: _refitted(self._without(self.campaign, problem, damper, kept_back), damper)
+        return lambda held_out: _refitted(_reduced_problem(self.campaign, problem, damper, held_out), damper)
 
-    def _by_criterion(self, damper: Damper) -> _Refit:
-        problem = self._unweighted(damper)
-        return lambda kept_back: _refitted(problem(kept_back), damper)
+    def _refit_by_criterion(self, damper: Damper) -> _Refit:
+        problem = self._criterion_problem(damper)
+        return lambda held_out: _refitted(problem(held_out), damper)
 
-    def _unweighted(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
-        """What is fitted by criterion (4), by what is kept back."""
+    def _criterion_problem(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
+        """Return the problem of criterion (4) as a function of the held-out samples."""
         campaign = replace(self.campaign, nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
         problem = evidence_of(campaign, damper).whole
-        peaks = dict.fromkeys((o.place for o in problem.observations), 0.0)
+        peaks = dict.fromkeys((o.base_row for o in problem.observations), 0.0)
         for o in problem.observations:
-            peaks[o.place] = max(peaks[o.place], o.peak)
+            peaks[o.base_row] = max(peaks[o.base_row], o.peak)
 
-        def without(kept_back: Sequence[Mask]) -> Problem | None:
-            found = self._without(campaign, problem, damper, kept_back)
+        def without(held_out: Sequence[Mask]) -> Problem | None:
+            found = _reduced_problem(campaign, problem, damper, held_out)
             if found is None:
                 return None
-            named = {p.record.name: ~mask & counted(p) for p, mask in zip(campaign.prepared, kept_back, strict=True)}
-            counts = (int(np.count_nonzero(named[o.name])) for o in found.observations)
-            alike = (unweighted(o, n, peaks[o.place]) for o, n in zip(found.observations, counts, strict=True))
-            return replace(found, observations=tuple(alike))
+            pairs = zip(campaign.prepared, held_out, strict=True)
+            fitted = {p.record.name: int(np.count_nonzero(~mask & comparable_samples(p))) for p, mask in pairs}
+            weighted = (equally_weighted(o, fitted[o.name], peaks[o.base_row]) for o in found.observations)
+            return replace(found, observations=tuple(weighted))
 
         return without
 
-    def _without(
-        self, campaign: Campaign, problem: Problem, damper: Damper, kept_back: Sequence[Mask]
-    ) -> Problem | None:
-        """The problem without what is kept back; None where nothing is left."""
-        known = {o.name: o for o in problem.observations}
-        kept = []
-        for i, (p, mask) in enumerate(zip(campaign.prepared, kept_back, strict=True)):
-            part = known.get(p.record.name)
-            if part is None or mask.all():
-                continue
-            if mask.any():
-                (given,) = campaign.expected(damper, [i])
-                part = record_likelihood(p, ~mask, part.place, given, campaign.nuisance)
-            if part is not None:
-                kept.append(part)
-        return replace(problem, observations=tuple(kept)) if kept else None
+
+def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_out: Sequence[Mask]) -> Problem | None:
+    """Return the problem without the held-out samples; None where nothing is left."""
+    known = {o.name: o for o in problem.observations}
+    kept = []
+    for i, (p, mask) in enumerate(zip(campaign.prepared, held_out, strict=True)):
+        part = known.get(p.record.name)
+        if part is None or mask.all():
+            continue
+        if mask.any():
+            (given,) = campaign.predictions(damper, [i])
+            part = weighted_record(p, ~mask, part.base_row, given, campaign.nuisance)
+        if part is not None:
+            kept.append(part)
+    return replace(problem, observations=tuple(kept)) if kept else None
 
 
-def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> Fitted:
-    """A damper fitted anew from where it is."""
+def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
+    """Refit a damper from its present parameters."""
     return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
 
 
 def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
-    """A damper fitted anew, without the base rows that no test is left for."""
+    """Refit a damper, without the base rows for which no test is left."""
     if problem is None:
         return None
-    found, places = _fit(problem, damper, EVALUATIONS).damper, {o.place for o in problem.observations}
-    return found if -1 in places else with_rows(found, [found.base[i] for i in sorted(places)])
+    found, rows = _fit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
+    return found if -1 in rows else with_rows(found, [found.base[i] for i in sorted(rows)])
 
 
-def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
-    """The tests of a campaign dealt into folds: every voltage by itself, so that each fold takes a bit of each.
+def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) -> CrossValidation:
+    """Set up the cross-validation of a campaign, in which every sample may be fitted.
 
     Parameters
     ----------
-    campaign : the records of one setting
-    plain : as identify found it
-    visible : a gap (r.m.s.) below this share of a test's peak force counts as nothing
+    campaign : records of one setting
+    baseline : damper as identify found it
+    visible : a gap (r.m.s.) below this share of a test's peak force does not count
     """
     prepared = campaign.prepared
     everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
-    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.work)
-    dealt = deal(prepared, plain)
-    return Trials(whole, plain, visible, dealt.groups, dealt.voltages, dealt.folds)
+    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.budget)
+    folds = assign_folds(prepared, baseline)
+    return CrossValidation(folds.groups, folds.voltages, folds.folds, whole, baseline, visible)

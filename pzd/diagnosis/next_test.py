@@ -1,4 +1,7 @@
-"""The rig test that would separate rivals best, from the dampers fitted to them, within what the stand can do."""
+"""The next rig test: one that separates rivals, one more of the longest test, or one at a voltage between tested ones.
+
+Every test lies within the operating envelope: what the stand can do, by the config's limits or the records.
+"""
 
 from __future__ import annotations
 
@@ -14,41 +17,38 @@ from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.cross_validation import Missed, Trials
-from pzd.diagnosis.data import Prepared
-from pzd.record import Array, Record
+from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
+from pzd.diagnosis.data import PreparedRecord
+from pzd.record import Array
 from pzd.rig.config import Limits
-from pzd.signals.measures import rms
-
-# ----------------------------------------------------------------------------------------------------
-
+from pzd.signals.criterion import rms
 
 FREQUENCIES = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
-"""Frequencies that are weighed [Hz], and the largest."""
+"""Frequencies that are tried [Hz], beside the largest."""
 STROKES = (0.15, 0.3, 0.6, 1.0)
-"""Amplitudes that are weighed, as shares of the largest."""
+"""Amplitudes that are tried, as shares of the largest."""
 POINTS = 400
 """Samples of a cycle."""
 CYCLES = 2
-"""Simulated, the last compared."""
+"""Cycles that are simulated; the last is compared."""
 MANY_CYCLES = "ten"
-"""Of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
+"""Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
 STEPS_HZ = 4.0
-"""Changes of the voltage in the test that steps it, for each cycle."""
-LEAST = 0.02
-"""A test of less amplitude than this share of the largest is not weighed: the resolution of the stroke shows in it."""
+"""Changes of the voltage per cycle in the test that steps it."""
+SMALLEST_AMPLITUDE = 0.02
+"""Share of the largest amplitude below which no test is tried: the resolution of the stroke shows in it."""
 ROUND_OFF = 1e-12
 """Relative error of a difference of two displacements in double precision, with room."""
-MEASURED = 1e-3
-"""Relative error of a stroke or frequency as recorded: a sine of 10 mm sampled 100 times a cycle reaches 9.995 mm."""
+RECORDED_ERROR = 1e-3
+"""Relative error of a recorded stroke or frequency: a sine of 10 mm sampled 100 times a cycle reaches 9.995 mm."""
 
 
 @dataclass(frozen=True)
-class Reach:
-    """What a test may reach."""
+class OperatingEnvelope:
+    """Limits of a test."""
 
     middle: float
-    """Where the motion has its middle, in the displacement as recorded [m]."""
+    """Middle of the motion, in the displacement as recorded [m]."""
     amplitude: float
     """Largest amplitude about it [m]."""
     speed: float
@@ -61,8 +61,10 @@ class Reach:
     """Voltages to choose from [V]; empty without a control signal."""
 
 
-def reach_of(limits: Limits, prepared: Sequence[Prepared], voltages: Sequence[float]) -> Reach:
-    """What a test may reach: the config's limits, and where it gives none, what the records of this setting reached.
+def operating_envelope(
+    limits: Limits, prepared: Sequence[PreparedRecord], voltages: Sequence[float]
+) -> OperatingEnvelope:
+    """Return the limits of the config, and where it gives none, what the records of this setting reached.
 
     Parameters
     ----------
@@ -72,18 +74,20 @@ def reach_of(limits: Limits, prepared: Sequence[Prepared], voltages: Sequence[fl
     """
     records = [p.record for p in prepared]
     lowest, highest = _range([r.displacement for r in records])
-    force = _range([r.force for r in records])
-    amplitude = 0.5 * (highest - lowest) if limits.stroke_m is None else 0.5 * limits.stroke_m
-    middle = _tidy(0.5 * (lowest + highest), amplitude)
+    amplitude = 0.5 * (highest - lowest if limits.stroke_m is None else limits.stroke_m)
+    # To a digit that can be set, a hundredth of the amplitude's first digit or less; + 0.0 leaves no minus before zero.
+    middle = round(0.5 * (lowest + highest), 3 - math.floor(math.log10(amplitude))) + 0.0
     if limits.stroke_m is None:
-        amplitude = (1.0 + MEASURED) * min(highest - middle, middle - lowest)
-    return Reach(
+        amplitude = (1.0 + RECORDED_ERROR) * min(highest - middle, middle - lowest)
+    recorded = [r.voltage for r in records if r.voltage is not None]
+    low, high = limits.voltage_V or (_range(recorded) if recorded else (-np.inf, np.inf))
+    return OperatingEnvelope(
         middle,
         amplitude,
-        limits.speed_m_per_s or (1.0 + MEASURED) * max(float(np.max(np.abs(r.velocity))) for r in records),
-        limits.frequency_Hz or (1.0 + MEASURED) * max(frequency_of(p) for p in prepared),
-        force if limits.force_N is None else (-limits.force_N, limits.force_N),
-        _within(limits.voltage_V or _recorded_voltages(records), voltages),
+        limits.speed_m_per_s or (1.0 + RECORDED_ERROR) * max(float(np.max(np.abs(r.velocity))) for r in records),
+        limits.frequency_Hz or (1.0 + RECORDED_ERROR) * max(frequency_of(p) for p in prepared),
+        _range([r.force for r in records]) if limits.force_N is None else (-limits.force_N, limits.force_N),
+        tuple(sorted({min(max(v, low), high) for v in voltages})),
     )
 
 
@@ -91,54 +95,41 @@ def _range(channels: Sequence[Array]) -> tuple[float, float]:
     return min(float(np.min(c)) for c in channels), max(float(np.max(c)) for c in channels)
 
 
-def _tidy(middle: float, amplitude: float) -> float:
-    """A middle that can be set: to a digit that is a hundredth of the amplitude's first digit or less."""
-    return round(middle, 3 - math.floor(math.log10(amplitude))) + 0.0  # no minus before a zero
-
-
-def frequency_of(prepared: Prepared) -> float:
-    """Frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
+def frequency_of(prepared: PreparedRecord) -> float:
+    """Return the frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
     if prepared.cycles is not None:
         return 1.0 / prepared.cycles.period
     record = prepared.record
     return float(np.max(np.abs(record.velocity)) / (np.pi * np.ptp(record.displacement)))
 
 
-def _recorded_voltages(records: Sequence[Record]) -> tuple[float, float]:
-    channels = [r.voltage for r in records if r.voltage is not None]
-    return _range(channels) if channels else (-np.inf, np.inf)
-
-
-def _within(limits: tuple[float, float], voltages: Sequence[float]) -> tuple[float, ...]:
-    """The voltages inside the limits; the ends of the limits stand for those beyond."""
-    low, high = limits
-    return tuple(sorted({min(max(v, low), high) for v in voltages}))
-
-
-def next_test(
-    rivals: Sequence[tuple[str, Damper]], reach: Reach, temperature: float | None, offsets: Sequence[float] = ()
+def separating_test(
+    rivals: Sequence[tuple[str, Damper]],
+    envelope: OperatingEnvelope,
+    temperature: float | None,
+    offsets: Sequence[float] = (),
 ) -> NextTest | None:
-    """The test on which the rivals differ most, an offset, a gain and a delay of the test taken off.
+    """Find the test on which the rivals differ most, offset, gain and delay of a test fitted.
 
     Parameters
     ----------
-    rivals : name and fitted damper, the best first; it is told apart from each of the others
-    reach : what a test may reach; a test in which any rival would reach more is left out, for any may be the truth
+    rivals : name and fitted damper, the best first, which is separated from each of the others
+    envelope : limits of a test; one in which any rival would leave them is not tried, for any may be the truth
     temperature : at which the test is run [degC]
     offsets : by which the records lie above each rival's force [N]; none by default
 
     Returns
     -------
     the test, with the r.m.s. difference that it would show in % of peak, and the largest speed and force;
-    None without two rivals, or where each test would reach too much
+    None without two rivals, or where each test would leave the limits
     """
     if len(rivals) < 2:
         return None
     best: tuple[float, NextTest] | None = None
     above = np.array([*offsets] or [0.0] * len(rivals))[:, None]
-    for plan, motion in _plans(reach, temperature):
+    for plan, motion in _candidate_tests(envelope, temperature):
         forces = np.stack([respond(damper, motion) for _, damper in rivals]) + above
-        if np.min(forces) < reach.force[0] or np.max(forces) > reach.force[1]:
+        if np.min(forces) < envelope.force[0] or np.max(forces) > envelope.force[1]:
             continue
         last = forces[:, -POINTS:]
         distance = min(_distance(last[0], other) for other in last[1:])
@@ -154,72 +145,78 @@ def next_test(
     return best[1].model_copy(update={"separates": names, "distance_percent": round(100.0 * best[0], 3)})
 
 
-def one_more(recorded: Sequence[Prepared], reach: Reach) -> NextTest:
-    """A sine of many cycles as fast as the stand can, with the stroke of the longest record: one more test to average.
+def repeated_longest_test(recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope) -> NextTest:
+    """Propose one more test: a sine of many cycles as fast as the stand can, with the stroke of the longest record.
 
     Parameters
     ----------
-    recorded : the records, their displacement as recorded
-    reach : what a test may reach
+    recorded : records, their displacement as recorded
+    envelope : limits of a test
     """
     record = max(recorded, key=lambda p: float(np.ptp(p.record.time))).record
-    amplitude = min(0.5 * float(np.ptp(record.displacement)), reach.amplitude)
-    frequency = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
+    amplitude = min(0.5 * float(np.ptp(record.displacement)), envelope.amplitude)
+    frequency = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
     return NextTest(
         waveform=f"sine, {MANY_CYCLES} cycles",
         frequency_Hz=frequency,
         amplitude_m=rounded_down(amplitude),
-        middle_m=reach.middle,
+        middle_m=envelope.middle,
         voltage_V=record.median_voltage(),
         separates=(),
         peak_speed_m_per_s=float(2.0 * np.pi * frequency * rounded_down(amplitude)),
     )
 
 
-def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
+def _candidate_tests(envelope: OperatingEnvelope, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
+    """Yield the tests within the envelope, each with its motion."""
     shapes: tuple[tuple[str, Callable[[Array], Array], float], ...] = (
         ("sine", sine, 1.0),
         ("triangle", _triangle, 3.0),
     )
-    voltages: list[float | tuple[float, ...] | None] = [*reach.voltages] or [None]
-    if len(reach.voltages) > 1:
-        voltages.append((reach.voltages[0], reach.voltages[-1]))
-    frequencies = sorted({*(f for f in FREQUENCIES if f < reach.frequency), rounded_down(reach.frequency)})
+    voltages: list[float | tuple[float, ...] | None] = [*envelope.voltages] or [None]
+    if len(envelope.voltages) > 1:
+        voltages.append((envelope.voltages[0], envelope.voltages[-1]))
+    frequencies = sorted({*(f for f in FREQUENCIES if f < envelope.frequency), rounded_down(envelope.frequency)})
     for (name, shape, harmonic), f, share, voltage in itertools.product(shapes, frequencies, STROKES, voltages):
-        amplitude = rounded_down(min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f)))
-        if harmonic * f > reach.frequency or amplitude < LEAST * reach.amplitude:
+        amplitude = rounded_down(min(share * envelope.amplitude, envelope.speed / (2.0 * np.pi * f)))
+        if harmonic * f > envelope.frequency or amplitude < SMALLEST_AMPLITUDE * envelope.amplitude:
             continue
         stepped = isinstance(voltage, tuple)
         plan = NextTest(
             waveform=f"{name}, voltage stepped" if stepped else name,
             frequency_Hz=f,
             amplitude_m=amplitude,
-            middle_m=reach.middle,
+            middle_m=envelope.middle,
             voltage_V=voltage,
             separates=(),
         )
-        motion = motion_of(shape, f, amplitude, voltage, temperature)
-        yield plan, replace(motion, displacement=reach.middle + motion.displacement)
+        motion = test_motion(shape, f, amplitude, voltage, temperature)
+        yield plan, replace(motion, displacement=envelope.middle + motion.displacement)
 
 
 def rounded_down(value: float, error: float = ROUND_OFF) -> float:
-    """A positive number to three digits, never above it by more than its relative error.
+    """Round a positive number down to three digits, never above it by more than its relative error.
 
     So 0.02 stays 0.02 though a difference gave 0.0199...9.
+
+    Examples
+    --------
+    >>> rounded_down(0.019999999999999997), rounded_down(1.2349)
+    (0.02, 1.23)
     """
     larger = value * (1.0 + error)
     digits = 2 - math.floor(math.log10(larger))
     return round(math.floor(larger * 10.0**digits) / 10.0**digits, max(digits, 0))
 
 
-def motion_of(
+def test_motion(
     shape: Callable[[Array], Array],
     frequency: float,
     amplitude: float,
     voltage: float | tuple[float, ...] | None,
     temperature: float | None,
 ) -> Motion:
-    """Two cycles of a test about zero, the voltage constant, stepped between two, or none.
+    """Return two cycles of a test about zero, the voltage constant, stepped between two, or none.
 
     Parameters
     ----------
@@ -240,93 +237,83 @@ def motion_of(
         signal = np.where((STEPS_HZ * phase) % 2.0 < 1.0, voltage[0], voltage[1])
     elif voltage is not None:
         signal = np.full(time.size, voltage)
-    warmth = None if temperature is None else np.full(time.size, temperature)
-    return Motion(time, channels[0], channels[1], channels[2], signal, warmth)
+    warm = None if temperature is None else np.full(time.size, temperature)
+    return Motion(time, channels[0], channels[1], channels[2], signal, warm)
 
 
 def sine(phase: Array) -> Array:
-    """A cycle of a sine of amplitude one over the phase (n,) in cycles."""
+    """Return a sine of amplitude one over the phase (n,) in cycles."""
     return np.asarray(np.sin(2.0 * np.pi * phase))
 
 
 def _triangle(phase: Array) -> Array:
-    """Constant speed, its corners rounded by leaving out harmonics beyond the ninth, as a servo-hydraulic does."""
+    """Return a triangle of amplitude one, without harmonics beyond the ninth, as a servo-hydraulic rounds it."""
     orders = np.arange(1, 10, 2)
     terms = (-1.0) ** (orders // 2) / orders**2 * np.sin(2.0 * np.pi * np.outer(phase, orders))
     return np.asarray(8.0 / np.pi**2 * terms.sum(axis=1))
 
 
 def _distance(first: Array, second: Array) -> float:
-    """R.m.s. of what offset, gain and delay of a test cannot make of the difference, as a share of the peak."""
+    """Compute the r.m.s. difference that offset, gain and delay of a test cannot explain, as a share of the peak."""
     slack = np.column_stack([np.ones(first.size), first, np.gradient(first)])
     difference = second - first
     left = difference - slack @ np.linalg.lstsq(slack, difference, rcond=None)[0]
     return float(rms(left) / np.max(np.abs(first)))
 
 
-# ----------------------------------------------------------------------------------------------------
-# The rig test at a voltage between two tested ones, where the line between their parameters is known to miss most.
+# --- Test at a voltage between two tested ones
 #
-# T0, C and k are linear between voltages. A voltage left out of the fit shows by how much that line misses it: where that
-# is visibly more than is missed of tests at that voltage, the force between voltages is what is known least.
+# T0, C and k are linear between voltages. The interpolation error at a left-out voltage shows by how much: where it is
+# visibly larger than the held-out error of tests at that voltage, the force between voltages is what is known least.
 
 
-@dataclass(frozen=True)
-class PredictingDamper:
-    """A damper that is handed on, and what it misses of tests that it has not seen."""
-
-    damper: Damper
-    """Its displacement as recorded."""
-    offset: float
-    """By which the records lie above its force [N]."""
-    missed: Missed
-    """Of tests that were kept back."""
-    missed_between: Missed
-    """Of voltages between others that were left out."""
-
-
-def next_voltage(
-    predicting: PredictingDamper,
-    trials: Trials,
-    recorded: Sequence[Prepared],
-    reach: Reach,
+def intermediate_voltage_test(
+    damper: Damper,
+    offset: float,
+    errors: tuple[PredictionError, PredictionError],
+    validation: CrossValidation,
+    recorded: Sequence[PreparedRecord],
+    envelope: OperatingEnvelope,
     temperature: float | None,
 ) -> NextTest | None:
-    """A sine half-way between two voltages, with the stroke and frequency of the test that the line misses most.
+    """Propose a sine half-way between two voltages, with stroke and frequency of the test interpolated worst.
 
     Parameters
     ----------
-    predicting : the damper that is handed on
-    trials : the tests, dealt into folds
-    recorded : the records of the setting, their displacement as recorded
-    reach : what a test may reach
+    damper : adopted damper, its displacement as recorded
+    offset : by which the records lie above its force [N]
+    errors : held-out error and interpolation error of the damper
+    validation : cross-validation of the tests
+    recorded : records of the setting, their displacement as recorded
+    envelope : operating envelope of a test
     temperature : at which the test is run [degC]
 
     Returns
     -------
-    None where voltages left out are predicted as well as tests are, or the test would reach too much
+    None where left-out voltages are predicted as well as tests are, or the test would leave the envelope
     """
-    group = _least_known(trials, predicting.missed, predicting.missed_between)
+    group = _worst_interpolated_group(validation, *errors)
     if group is None:
         return None
-    below, above = _widest_beside(trials, group)
+    below, above = _widest_step(validation, group)
     voltage = 0.5 * (below + above)
-    if not reach.voltages[0] <= voltage <= reach.voltages[-1]:
+    if not envelope.voltages[0] <= voltage <= envelope.voltages[-1]:
         return None
-    test = recorded[_most_missed(predicting.missed_between.of(trials.groups[group]))]
+    between = errors[1].of_records(validation.groups[group])
+    test = recorded[between.records[int(np.argmax(between.error / between.energy))]]
     half_stroke = 0.5 * float(np.ptp(test.record.displacement))
-    amplitude = min(rounded_down(half_stroke, MEASURED), rounded_down(reach.amplitude))
-    fastest = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
-    frequency = min(rounded_down(frequency_of(test), MEASURED), fastest)
-    motion = motion_of(sine, frequency, amplitude, voltage, temperature)
-    force = respond(predicting.damper, motion.centred_on(-reach.middle)) + predicting.offset
-    if np.min(force) < reach.force[0] or np.max(force) > reach.force[1]:
+    amplitude = min(rounded_down(half_stroke, RECORDED_ERROR), rounded_down(envelope.amplitude))
+    fastest = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
+    frequency = min(rounded_down(frequency_of(test), RECORDED_ERROR), fastest)
+    motion = test_motion(sine, frequency, amplitude, voltage, temperature)
+    force = respond(damper, motion.about(-envelope.middle)) + offset
+    if np.min(force) < envelope.force[0] or np.max(force) > envelope.force[1]:
         return None
     return NextTest(
         waveform="sine",
         frequency_Hz=frequency,
         amplitude_m=amplitude,
-        middle_m=reach.middle,
+        middle_m=envelope.middle,
         voltage_V=voltage,
         separates=(),
         between_voltage_V=(below, above),
@@ -335,20 +322,20 @@ def next_voltage(
     )
 
 
-def _least_known(trials: Trials, missed: Missed, between: Missed) -> int | None:
-    """Of the voltages that are predicted visibly worse left out than tests are, the one predicted worst."""
-    pairs = [(i, missed.of(trials.groups[i]), between.of(trials.groups[i])) for i in trials.between()]
-    worse = [(out.criterion or 0.0, i) for i, kept_back, out in pairs if kept_back.record and kept_back.less_than(out)]
+def _worst_interpolated_group(
+    validation: CrossValidation, held_out: PredictionError, between: PredictionError
+) -> int | None:
+    """Return the voltage with the largest interpolation error, of those where it exceeds the held-out error visibly."""
+    worse = []
+    for i in validation.interior_groups():
+        tested, interpolated = (each.of_records(validation.groups[i]) for each in (held_out, between))
+        if tested.records and tested.visibly_below(interpolated):
+            worse.append((interpolated.criterion or 0.0, i))
     return max(worse)[1] if worse else None
 
 
-def _widest_beside(trials: Trials, group: int) -> tuple[float, float]:
-    """The wider of both steps from a voltage to its neighbours [V], the lower one where they are alike."""
-    voltages = sorted(v for v in trials.voltages if v is not None)
-    steps = [step for step in pairwise(voltages) if trials.voltages[group] in step]
+def _widest_step(validation: CrossValidation, group: int) -> tuple[float, float]:
+    """Return the wider of both steps from a voltage to its neighbours [V], the lower one where they are alike."""
+    voltages = sorted(v for v in validation.voltages if v is not None)
+    steps = [step for step in pairwise(voltages) if validation.voltages[group] in step]
     return max(steps, key=lambda step: step[1] - step[0])
-
-
-def _most_missed(missed: Missed) -> int:
-    """The record that is missed most, by its W_s."""
-    return missed.record[int(np.argmax(missed.error / missed.energy))]

@@ -1,4 +1,4 @@
-"""Every fixed threshold by which an effect is tried, adopted, refused or removed, and a verdict reached.
+"""Fixed thresholds by which an effect is tried, adopted, refused or removed, and a verdict reached.
 
 The thresholds that a user may change are fields of `DiagnoseConfig` with defaults of their own: `significance`,
 `visible`, `negligible`, `unexplained_share`, `adopt_bic`, `rival_bic`, `most_effects` and `most_added`. These here are
@@ -9,176 +9,177 @@ case is known to depend on; `make sensitivity` prints what halving and doubling 
 
 from __future__ import annotations
 
-# Which effects are tried, and how far each is searched (search/candidates.py)
+# --- Which effects are tried, and how far each is searched (search/candidates.py)
 
 MOVING_VOLTAGE = 0.02
-"""A voltage moves in a test if its range there exceeds this share of the rig's scale.
+"""Share of the rig's scale that the range of a voltage in a test must exceed to count as moving.
 
-Reason: the share that the records themselves are parted by, see `CONSTANT_SHARE` in `pzd/record.py`."""
+Reason: the share by which records are sorted into constant and moving, see `CONSTANT_SHARE` in `pzd/record.py`."""
 FIRST_EVALUATIONS = 6
-"""Evaluations after which the candidates are compared for the first time; the better ones go on.
+"""Evaluations after which the candidates are compared for the first time; the better ones are searched on.
 
-Reason: time. What is still far from its optimum then is kept by the room that `WORTH_SEARCHING` leaves; not tuned."""
-WORTH_SEARCHING = 0.5
-"""A candidate that pays less than this share of what the best pays is not searched on.
+Reason: time. What is still far from its optimum then is kept by the margin of `SHARE_WORTH_SEARCHING`; not tuned."""
+SHARE_WORTH_SEARCHING = 0.5
+"""Share of the best improvement of the criterion below which a candidate is not searched on.
 
 Reason: time; not tuned."""
 MOST_EVALUATIONS_OF_BEST = 100
-"""Evaluations after which even a converged optimum is left as it is.
+"""Evaluations after which the search for the chosen optimum ends.
 
 Reason: five times those of any other fit; not tuned."""
 NEARLY_AS_GOOD = 0.95
-"""Candidates that pay at least this share of what the chosen one pays are searched to the end like it.
+"""Share of the chosen improvement from which other candidates are searched to their optimum as well.
 
-Reason: two effects that explain alike have to be compared at their optima, or the one searched longer wins."""
+Reason: two effects that explain the same have to be compared at their optima, or the one searched longer wins."""
 STARTS_TRIED = 2
-"""Starting values tried before fainter ones.
+"""Starting values tried before smaller ones.
 
 Reason: time. The starts are sorted by what a linearised step promises; not tuned."""
-FAINTER_STARTS = (0.3, 0.1, 0.03, 0.01)
+SMALLER_STARTS = (0.3, 0.1, 0.03, 0.01)
 """Shares of the way from no effect to the most promising starting values, tried where the search got stuck.
 
 Reason: in half decades down to a hundredth, below which an effect at its usual size is not visible."""
-WORSE_THAN_CONTAINED = 1.0
-"""A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck.
+STUCK_MISFIT = 1.0
+"""Excess misfit [squares of noise] over a nested model from which a search counts as stuck.
 
-Reason: at its optimum it is never worse; one square of noise is far below what `adopt_bic` asks for."""
-AT_EDGE = 0.01
-"""A searched variable that ends so near to a limit ends at it.
+Reason: at its optimum a model is never worse than one that it contains; one square of noise is far below what
+`adopt_bic` asks for."""
+SEARCH_LIMIT_MARGIN = 0.01
+"""Distance from a limit within which a search variable counts as ending at it.
 
 Reason: 1 % of a parameter that is searched by its logarithm; not tuned."""
-FAINT = 0.1
+LINEARISED_SHARE = 0.1
 """Share of the way to its starting values at which an effect that noise nearly hides is linearised.
 
 Reason: there a law is still nearly linear in its parameter; the starting values themselves are tried beside it."""
-FAINTEST = 0.01
-"""Where an effect is looked for from none on, it is linearised over so much of its scale.
+LINEARISED_FROM_ZERO = 0.01
+"""Share of its scale at which an effect that starts from zero is linearised.
 
 Reason: a hundredth of the largest force, or of its like, where such effects are linear in their parameter."""
-LEAST_PROMISE = 15.0
-"""An effect that promises to lower the misfit by less is not searched for where noise explains what is left.
+LEAST_DROP_IN_NOISE = 15.0
+"""Promised drop of the misfit below which an effect is not fitted where noise explains what is left.
 
 Reason: to pay it must lower the misfit by -`adopt_bic` + ln n, twice this; a linearised promise is not exact."""
-SLIGHT_PROMISE = 3.0
-"""Nor is one searched for that promises less than this where something is missing.
+LEAST_DROP_IN_GAP = 3.0
+"""Promised drop of the misfit below which an effect is not fitted where a gap is left.
 
-Reason: a fifth of `LEAST_PROMISE`. Of 24 cases of the benchmark (seed 1) the searches that were promised least reached
-4.5 (relief_valve) and 4.7 times (sensor_delay) what was promised."""
-WORTH_FITTING = 0.02
-"""Nor is one that promises less than this share of what the best one promises.
+Reason: a fifth of `LEAST_DROP_IN_NOISE`. Of 24 cases of the benchmark (seed 1) the searches that were promised least
+reached 4.5 (relief_valve) and 4.7 times (sensor_delay) what was promised."""
+SHARE_WORTH_FITTING = 0.02
+"""Share of the best promised drop below which an effect is not fitted.
 
 Reason: at five times its promise it would still pay a tenth of the best, and no rival does that; not tuned."""
 
 MOST_TIME_CONSTANTS = 3.0
-"""Time constants C/k of an element that fit into one sample at most; a faster element is not looked for.
+"""Time constants C/k of an element per sample, at most; a faster element is not searched for.
 
 Reason: after three the element is at rest but for 5 %, so that samples cannot tell it from a faster one."""
 
-# When an effect is adopted or refused (search/acceptance.py)
+# --- When an effect is accepted (search/acceptance.py)
 
 LEAST_CLOSED = 0.2
-"""An effect closes at least this share of the gap (mean square), each test counted by its own peak or all by force.
+"""Share of the gap (mean square) that an effect must close, each test counted by its own peak or all by force.
 
-Reason: what is real is not one of many small corrections. Tests of small force may keep a gap of another kind, as
-those at 0 A of configs/utfpr.yaml do, and would hide what the others show: hence the two counts."""
+Reason: what is real is not one of many small corrections. Tests of small force may keep a gap of another kind, as those
+at 0 A of configs/utfpr.yaml do, and would hide what the others show: hence the two counts."""
 TRIVIAL_SIZE = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
-"""A common offset [share of the lowest peak], delay or lag [s] below which it counts as nothing missing.
+"""Common offset [share of the lowest peak], delay or lag [s] below which it counts as nothing missing.
 
 Reason: twice the prior of a test's own offset and delay (`NuisanceConfig`): what is smaller may be the rig's."""
-OF_EACH_TEST = frozenset(effect for effect, _ in TRIVIAL_SIZE)
-"""The effects that each test may have a little of for itself."""
-STOP_BEGINS = 0.4
-"""No end stop begins within this share of the half stroke about its middle.
+NUISANCE_EFFECTS = frozenset(effect for effect, _ in TRIVIAL_SIZE)
+"""Effects of which each test may have a little for itself."""
+END_STOP_BEGINS = 0.4
+"""Share of the half stroke about its middle within which no end stop begins.
 
 Reason: stops act over the last 10 to 30 % of the stroke, a soft rubber one over half of it."""
-STOP_OTHER_SIDE = 0.1
-"""Share of its force at one end of the stroke that a stop has to reach at the other end.
+END_STOP_OTHER_SIDE = 0.1
+"""Share of its force at one end of the stroke that a stop must reach at the other end.
 
-Reason: a stop at one end alone cannot be told from a stroke that is recorded off its middle; not tuned."""
+Reason: a stop at one end alone looks like a stroke that is recorded off its middle; not tuned."""
 HALVES_SIGNIFICANCE = 0.001
-"""Halves of the tests disagree about a parameter where chance alone would let them so seldom.
+"""Probability by chance below which halves of the tests disagree about a parameter.
 
 Reason: the level of `significance`; the limit on the misfit is twice the quantile of chi-square, for two halves."""
-HALVES_LOSE = 0.05
-"""Nor do they where a half loses less with the other's values than this share of what the effect explains in all.
+HALVES_LOSS = 0.05
+"""Share of what an effect explains in all, within which the loss of a half with the other's values counts as agreement.
 
 Reason: of a parameter that enters linearly a fifth of its value; an effect that explains much tells halves apart by
 what gains and clocks of a stand make of it. Not tuned."""
 HALVES_ALIKE = 0.1
-"""Values from either half within this ratio of one another agree, whatever their intervals.
+"""Ratio within which values from either half agree, whatever their intervals.
 
 Reason: the intervals of quiet tests are narrower than what the gains of a rig make of a parameter; not tuned."""
 
-# When an optimum or an effect is given up again (search/forward_selection.py, search/reweighting.py, missed.py)
+# --- When an optimum or an effect is given up (search/forward_selection.py, cross_validation.py)
 
-WIDER = 1.1
-"""An optimum that widens the gap by more than this factor over where its search began is not gone to.
+LARGEST_GAP_GROWTH = 1.1
+"""Factor by which an optimum may widen the gap over where its search began.
 
 Reason: weights by noise may bend a fit away from the force; up to 10 % is the play of rounding. Not tuned."""
-AT_REST = 0.2
-"""A parameter that moves by less than this share of its standard error stays where it is.
+CONVERGED_CHANGE = 0.2
+"""Change of a parameter, as a share of its standard error, below which reweighting ends.
 
 Reason: it widens an interval by 2 % (root of 1 + 0.2^2), less than anything the intervals promise."""
 MOST_REWEIGHTINGS = 5
-"""Times that the tests are weighed anew at the end, at most.
+"""Times that the tests are reweighted at the end, at most.
 
 Reason: time; what swings between two optima would never end."""
-PREDICTS_WORSE = 2.0
+PREDICTION_STANDARD_ERRORS = 2.0
 """Standard errors of the paired difference over tests from which one damper predicts worse than another; of few tests
 as many more as Student's t takes for the same confidence.
 
 Reason: the customary 95 %."""
 
-WORSE_BETWEEN = 1.5
-"""W_s of a voltage left out, as a multiple of the plain damper's, from which effects are not handed on.
+INTERPOLATION_ERROR_RATIO = 1.5
+"""Interpolation error at a left-out voltage, as a multiple of the baseline's, from which effects are not adopted.
 
 Reason: there the line between voltages misses more than any law, and with a true law, when T0 and C become those of the
-damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the same, tell chance.
-7 % more was seen with a true name, 2.9 times with a wrong one; not tuned."""
+damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the same, tell chance. 7
+% more was seen with a true name, 2.9 times with a wrong one; not tuned."""
 
-# When an effect is added for what it predicts alone (added_by_prediction.py)
+# --- When an effect is added for its prediction alone (adoption.py)
 
-LEAST_CUT_IN_PREDICTION = 0.05
-"""An effect lowers the pooled W_s of kept-back tests by at least this share.
+LEAST_PREDICTION_GAIN = 0.05
+"""Share by which an added effect must lower the pooled W_s of held-out tests.
 
 Reason: less than a twentieth is no reason for a law more, however sure it is; not tuned."""
-SCREENED = 5
-"""Effects that are fitted, those that promise most of what a linearised step would reach.
+SCREENED_EFFECTS = 5
+"""Effects that are fitted: those with the largest promised drop of the misfit.
 
 Reason: time; on configs/utfsm.yaml the effect that predicts best is among the first three."""
-PREDICTED_AT_ONCE = 3
-"""Candidates of which kept-back tests are predicted, those that fit best.
+CROSS_VALIDATED_CANDIDATES = 3
+"""Candidates that are cross-validated: those that fit best.
 
 Reason: time; each takes as many refits as there are folds."""
-FARTHEST_HALF_WAY = 0.25
-"""Of the difference between the forces at two neighbouring voltages, what the force half-way may lie off their mean.
+INTERPOLATION_DEPARTURE = 0.25
+"""Largest departure of the force half-way between two voltages from the mean of both, as a share of their difference.
 
 Reason: a force that goes with the square of the voltage lies off by just that; with parameters on lines, and an effect
 that the tests know at each voltage, it is a few hundredths. Not tuned."""
 
-# What the tests' own gains, offsets and delays have in common (trends_of_tests.py)
+# --- Trends of the nuisances over the tests (verdict.py)
 
 FEWEST_FOR_A_TREND = 3
-"""Degrees of freedom from which a trend over tests is looked for.
+"""Degrees of freedom from which a trend over tests is estimated.
 
 Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
 
-# What the verdict adds (verdict.py, residual_check.py)
+# --- What counts as a gap, and when it contradicts a name (gap.py, verdict.py)
 
 CYCLE_CHANGE_SIGNIFICANCE = 1e-4
-"""A change from cycle to cycle counts in the gap where noise alone would show it less often than this.
+"""Probability by noise alone below which a change from cycle to cycle counts in the gap.
 
 Reason: a tenth of `significance`, since every test is asked; not tuned."""
 LEAST_HUM = 5e-4
-"""A line of the mains counts as a nuisance of its test from this share of the test's peak on.
+"""Amplitude of a mains line, as a share of the test's peak, from which it counts as a nuisance.
 
 Reason: a fifth of `visible`, below which no gap matters; not tuned."""
-CONTRADICTS = 2.0
-"""A remainder of so many times `visible` contradicts that these effects are all, whatever they closed.
+LARGE_REMAINDER = 2.0
+"""Multiple of `visible` from which a remaining gap contradicts that the adopted effects are all.
 
 Reason: a large effect may close all but a tenth of the gap, and the tenth be as large as a second one; not tuned."""
 
-# How sure a verdict is (confidence.py, search/detection.py)
+# --- Confidence of a verdict (verdict.py, search/acceptance.py)
 
 OUTSIDE_LIBRARY = 0.03
 """Share of cases in which something is missing that is not in the library, and that looks like one of its effects or
@@ -186,11 +187,11 @@ like nothing.
 
 Reason: benchmark: with it 97.0 % were stated and 97.6 % hit in 710 cases of the highest confidence."""
 LARGEST_GAP = 0.25
-"""Largest gap [share of peak, r.m.s.] that a missing effect is expected to leave; the smallest is `visible`.
+"""Largest gap [share of peak, r.m.s.] in the prior of a missing effect; the smallest is `visible`.
 
 Reason: a quarter of the peak would be no extension of T0, C and k but another damper; it enters by its logarithm."""
 SMALLEST_GAP = 0.01
-"""Share of `visible` down to which an effect too small to count is expected.
+"""Share of `visible` down to which the prior of an effect too small to count extends.
 
 Reason: as many decades below `visible` as lie above it; it enters by its logarithm."""
 SIZES_AVERAGED = 400
@@ -198,14 +199,14 @@ SIZES_AVERAGED = 400
 
 Reason: 1 % from one to the next, so that a gap known to 2 % is resolved."""
 NOT_EXCLUDED = 0.05
-"""From this probability on an effect is told as one that the tests do not exclude.
+"""Probability from which an effect is reported as one that the tests do not exclude.
 
 Reason: as much as a 95 % interval leaves outside; not tuned."""
 LIKELIER_THAN_NOT = 0.5
-"""Below this confidence what the tests do not exclude is told as possible, and the verdict is open.
+"""Confidence below which what the tests do not exclude is reported as possible, and the verdict is ambiguous.
 
-Reason: something else is then likelier than what would be said."""
+Reason: something else is then likelier than the verdict."""
 DOUBTFUL_BELOW = 0.9
-"""Below this confidence a verdict tells what is not excluded, and one more test is proposed.
+"""Confidence below which a verdict reports what is not excluded, and one more test is proposed.
 
 Reason: one such verdict in ten is wrong then, if the confidence is right; not tuned."""

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import damper_of, sine
+from synthetic import damper_of, sine
 
 from pzd.damper.effects import library
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.data import prepare, split
-from pzd.diagnosis.fit.forces import BlockSlopes
-from pzd.diagnosis.fit.least_squares import LEVEL, Fitted, base_half_widths, disagreement, fit, standard_errors
-from pzd.diagnosis.fit.parameters import Unknown
-from pzd.diagnosis.search.evidence import Evidence, evidence_of
+from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, base_half_widths, disagreement, fit, standard_errors
+from pzd.diagnosis.fit.problem import Unknown
+from pzd.diagnosis.fit.sensitivities import BlockJacobian
 from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -26,7 +25,7 @@ OF_EFFECT = slice(3, 4)
 """Of what `linear` searches, the effect's parameter."""
 
 
-def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
+def linear(rng: np.random.Generator, pulled: float) -> tuple[FitResult, float]:
     """A linear fit of three base variables and one parameter, and by how much it misses that parameter.
 
     Every test has its own value of the parameter besides, `pulled` times what its noise leaves of it.
@@ -40,20 +39,20 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     parameter = library()["fluid_inertia"].parameters[0]
     unknowns = (Unknown("fluid_inertia", parameter, 1.0),)
     split_left = tuple(left.reshape(TESTS, 40))
-    by_all = BlockSlopes(4, ((tuple(range(4)), jacobian),))
-    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), lambda: by_all)
+    by_all = BlockJacobian(4, ((tuple(range(4)), jacobian),))
+    fitted = FitResult(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), lambda: by_all)
     return fitted, float(step[3])
 
 
-def share_inside(rng: np.random.Generator, pulled: float, errors: Callable[[Fitted], Array]) -> float:
+def share_inside(rng: np.random.Generator, pulled: float, errors: Callable[[FitResult], Array]) -> float:
     fits = [linear(rng, pulled) for _ in range(DRAWS)]
     return float(
-        np.mean([abs(miss) <= LEVEL * errors(fitted)[0] / fitted.unknowns[0].slope(0.0) for fitted, miss in fits])
+        np.mean([abs(miss) <= LEVEL * errors(fitted)[0] / fitted.unknowns[0].derivative(0.0) for fitted, miss in fits])
     )
 
 
-def by_noise_alone(fitted: Fitted) -> Array:
-    return np.sqrt(np.diag(fitted.covariance)[-1:]) * fitted.unknowns[0].slope(0.0)
+def by_noise_alone(fitted: FitResult) -> Array:
+    return np.sqrt(np.diag(fitted.covariance)[-1:]) * fitted.unknowns[0].derivative(0.0)
 
 
 def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(rng: np.random.Generator) -> None:
@@ -90,7 +89,7 @@ def shown_late(
     return replace(record, force=record.force + 1e-4 * np.max(record.force) * rng.standard_normal(record.force.size))
 
 
-def fitted_to(records: tuple[Record, ...], effects: dict[str, dict[str, float]]) -> tuple[Evidence, Fitted]:
+def fitted_to(records: tuple[Record, ...], effects: dict[str, dict[str, float]]) -> tuple[Evidence, FitResult]:
     """Fitted from the truth, and weighed by what that leaves."""
     damper, prepared = damper_of((0.0, 150.0), **effects), prepare(records)
     for _ in range(3):

@@ -10,21 +10,18 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from campaign import damper_of, sines
-from test_kept_back import TWO, campaign_of
-from whole_diagnosis import all_but, diagnosed
+from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
 
-import pzd.diagnosis.hypotheses.summary
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
 from pzd.cli.look import diagnosis_lines
 from pzd.damper.compiled.laws import declared
+from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Trials, trials_of
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.hypotheses import hypotheses, proposal_of
 from pzd.diagnosis.hypotheses.regression import residuals_of
 from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
-from pzd.diagnosis.hypotheses.summary import hypotheses, proposal_of
-from pzd.diagnosis.search.evidence import evidence_of
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError
@@ -39,18 +36,18 @@ def records_with(force: Force, rng: np.random.Generator, jitter: float = 0.0) ->
     return tuple(replace(r, force=r.force + force(r)) for r in plain)
 
 
-def fitted(records: tuple[Record, ...]) -> Trials:
+def fitted(records: tuple[Record, ...]) -> CrossValidation:
     """The tests, dealt into folds, and the plain damper fitted to them."""
     campaign = campaign_of(records)
     evidence = evidence_of(campaign, damper_of(TWO))
     plain = fit(evidence.whole, (), evidence.whole.start()).damper
-    return trials_of(campaign, plain, DiagnoseConfig().visible)
+    return cross_validation_of(campaign, plain, DiagnoseConfig().visible)
 
 
 def told(records: tuple[Record, ...]) -> Hypotheses:
     """The hypotheses on what the plain damper, fitted to the records, leaves of them."""
-    trials = fitted(records)
-    return hypotheses(trials, trials.plain, Control())
+    validation = fitted(records)
+    return hypotheses(validation, validation.baseline, Control())
 
 
 FORCES: dict[str, tuple[Force, float]] = {
@@ -80,7 +77,7 @@ def test_the_shape_of_what_is_left_comes_first_with_its_coefficient(shape: str, 
     assert best.W_s_after < 0.2 * best.W_s_before
 
 
-def test_what_friction_and_damping_take_up_of_a_shape_does_not_bias_its_coefficient(rng: np.random.Generator) -> None:
+def test_projecting_out_friction_and_damping_does_not_bias_a_coefficient(rng: np.random.Generator) -> None:
     """An orifice is mostly taken up by T0 and C, so that its coefficient does not show in what is left."""
     found = told(records_with(lambda r: 1500.0 * np.abs(r.velocity) * r.velocity, rng))
     orifice = next(row for row in found.alone if row.shape == "|v| v")
@@ -88,10 +85,10 @@ def test_what_friction_and_damping_take_up_of_a_shape_does_not_bias_its_coeffici
     assert orifice.coefficient == pytest.approx(1500.0, rel=0.1)
 
 
-def test_what_a_tests_own_gain_offset_and_delay_make_hardly_counts(rng: np.random.Generator) -> None:
+def test_gain_offset_and_delay_of_a_test_are_projected_out(rng: np.random.Generator) -> None:
     """By their priors: a gain of 2 % counts as one square of noise, however many samples show it."""
-    trials = fitted(records_with(lambda r: np.zeros(r.time.size), rng))
-    test = residuals_of(trials, trials.plain).tests[0]
+    validation = fitted(records_with(lambda r: np.zeros(r.time.size), rng))
+    test = residuals_of(validation, validation.baseline).tests[0]
     by_own = test.nuisances
     counted = np.diag(test.products(by_own, test.counts)) / test.noise
     assert np.all(counted <= 1.0)
@@ -111,7 +108,7 @@ def test_noise_has_no_shape(rng: np.random.Generator) -> None:
     assert (found.sought, found.rows, found.points) == (True, (), ())
 
 
-def test_what_a_single_test_shows_predicts_no_other_and_is_not_told(rng: np.random.Generator) -> None:
+def test_a_shape_of_a_single_test_predicts_no_other_and_is_not_reported(rng: np.random.Generator) -> None:
     def in_one_test(r: Record) -> Array:
         amount = 15000.0 if r.name == "s150V-1Hz-30mm" else 0.0
         return np.asarray(amount * np.abs(r.displacement) * r.velocity)
@@ -122,7 +119,7 @@ def test_what_a_single_test_shows_predicts_no_other_and_is_not_told(rng: np.rand
 
 
 @pytest.mark.ci
-def test_a_second_shape_is_told_beside_the_first(rng: np.random.Generator) -> None:
+def test_a_second_shape_is_reported_beside_the_first(rng: np.random.Generator) -> None:
     first, second = FORCES["|x| v"][0], FORCES["x^2"][0]
     found = told(records_with(lambda r: 2.0 * first(r) + second(r), rng))
     best, beside = found.alone[0], found.together[0]
@@ -155,10 +152,10 @@ def bypass(bypass_records: tuple[Record, ...]) -> Diagnosed:
 
 
 @pytest.mark.ci
-def test_the_hypothesis_changes_nothing_that_is_handed_on(
+def test_a_hypothesis_leaves_the_adopted_damper_unchanged(
     bypass: Diagnosed, bypass_records: tuple[Record, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pzd.diagnose.hypotheses.rows, "hypotheses", lambda *_: Hypotheses())
+    monkeypatch.setattr("pzd.diagnosis.stage.hypotheses", lambda *_: Hypotheses())
     without = diagnosed(bypass_records, forbid=all_but("gas_spring"))
     for name, one in (("with", bypass), ("without", without)):
         (tmp_path / name).mkdir()

@@ -1,4 +1,4 @@
-"""The next test stays within what was recorded or allowed, and tells the rivals apart."""
+"""The next test stays within the operating envelope, and separates rivals or tests between voltages."""
 
 from __future__ import annotations
 
@@ -7,13 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import campaign_of, damper_of, sines
 
 from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import Prepared, prepare
-from pzd.diagnosis.next_test import MEASURED, STROKES, Reach, next_test, reach_of, rounded_down
+from pzd.diagnosis.cross_validation import cross_validation_of
+from pzd.diagnosis.data import PreparedRecord, prepare
+from pzd.diagnosis.next_test import (
+    RECORDED_ERROR,
+    STROKES,
+    OperatingEnvelope,
+    intermediate_voltage_test,
+    operating_envelope,
+    rounded_down,
+    separating_test,
+)
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
 
@@ -34,9 +44,9 @@ def peak_acceleration(waveform: str, frequency: float, amplitude: float) -> floa
     return share * amplitude * (2.0 * np.pi * frequency) ** 2
 
 
-def proposed(reach: Reach) -> tuple[NextTest, float, float, float] | None:
+def proposed(envelope: OperatingEnvelope) -> tuple[NextTest, float, float, float] | None:
     """The test, and its frequency, amplitude and middle."""
-    found = next_test(RIVALS, reach, None)
+    found = separating_test(RIVALS, envelope, None)
     if found is None:
         return None
     assert found.frequency_Hz is not None
@@ -48,21 +58,23 @@ def proposed(reach: Reach) -> tuple[NextTest, float, float, float] | None:
 def test_the_test_is_within_stroke_speed_frequency_and_force(rng: np.random.Generator) -> None:
     for draw in rng.spawn(12):
         force = 10.0 ** draw.uniform(2, 5)
-        reach = Reach(0.0, draw.uniform(0.01, 0.06), draw.uniform(0.1, 1.0), draw.uniform(2.5, 30.0), (-force, force))
-        found = proposed(reach)
+        envelope = OperatingEnvelope(
+            0.0, draw.uniform(0.01, 0.06), draw.uniform(0.1, 1.0), draw.uniform(2.5, 30.0), (-force, force)
+        )
+        found = proposed(envelope)
         if found is None:
             continue  # nothing that the stand can do stays below its force
         told, f, amplitude, _ = found
-        assert amplitude <= reach.amplitude
-        assert 2.0 * np.pi * f * amplitude <= reach.speed
-        assert f <= reach.frequency
-        friction = 1.0 + 10.0 * reach.speed
+        assert amplitude <= envelope.amplitude
+        assert 2.0 * np.pi * f * amplitude <= envelope.speed
+        assert f <= envelope.frequency
+        friction = 1.0 + 10.0 * envelope.speed
         assert MASS * peak_acceleration(told.waveform, f, amplitude) <= 1.02 * force + friction
         assert ALIKE_AT_1_HZ * amplitude <= 1.02 * force + friction
 
 
 def test_a_spring_and_a_mass_that_are_alike_on_one_frequency_are_told_apart_at_another_frequency() -> None:
-    told = next_test(RIVALS, Reach(0.0, 0.05, 0.6, 20.0, ANY_FORCE), None)
+    told = separating_test(RIVALS, OperatingEnvelope(0.0, 0.05, 0.6, 20.0, ANY_FORCE), None)
     assert told is not None
     assert told.frequency_Hz != pytest.approx(1.0)
     assert told.separates == ("gas_spring", "fluid_inertia")
@@ -71,7 +83,7 @@ def test_a_spring_and_a_mass_that_are_alike_on_one_frequency_are_told_apart_at_a
 
 
 def test_nothing_is_proposed_where_every_test_exceeds_the_force() -> None:
-    assert next_test(RIVALS, Reach(0.0, 0.05, 0.6, 20.0, (-0.5, 0.5)), None) is None
+    assert separating_test(RIVALS, OperatingEnvelope(0.0, 0.05, 0.6, 20.0, (-0.5, 0.5)), None) is None
 
 
 def sine(frequency: float, amplitude: float, middle: float = 0.0, force: Callable[[Array, Array], Array] | None = None,
@@ -87,7 +99,7 @@ def sine(frequency: float, amplitude: float, middle: float = 0.0, force: Callabl
     )  # fmt: skip
 
 
-def extremes(prepared: tuple[Prepared, ...], channel: str) -> tuple[float, float]:
+def extremes(prepared: tuple[PreparedRecord, ...], channel: str) -> tuple[float, float]:
     values = [getattr(p.record, channel) for p in prepared]
     return min(float(v.min()) for v in values), max(float(v.max()) for v in values)
 
@@ -113,12 +125,12 @@ def moved(told: NextTest) -> Motion:
 def test_a_damper_measured_off_zero_is_moved_within_its_stroke() -> None:
     """12.7 to 50 mm were recorded: 37.3 mm of stroke, not 100."""
     prepared = prepare((sine(2.0, 0.01865, 0.03135), sine(1.0, 0.01, 0.03135)))
-    reach = reach_of(Limits(), prepared, ())
-    assert reach.middle == pytest.approx(0.03135, abs=2e-5)
-    assert reach.amplitude == pytest.approx(0.01865, abs=2e-5)
-    assert reach.frequency == pytest.approx(2.0, rel=1e-3)
-    assert reach.voltages == ()
-    found = proposed(reach)
+    envelope = operating_envelope(Limits(), prepared, ())
+    assert envelope.middle == pytest.approx(0.03135, abs=2e-5)
+    assert envelope.amplitude == pytest.approx(0.01865, abs=2e-5)
+    assert envelope.frequency == pytest.approx(2.0, rel=1e-3)
+    assert envelope.voltages == ()
+    found = proposed(envelope)
     assert found is not None
     assert found[3] - found[2] >= 0.0127 - 1e-5
     assert found[3] + found[2] <= 0.05 + 1e-5
@@ -136,17 +148,17 @@ def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force(rng:
             for _ in range(3)
         )  # fmt: skip
         prepared = prepare(records)
-        told = next_test(RIVALS, reach_of(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * middle, 0.0))
+        told = separating_test(RIVALS, operating_envelope(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * middle, 0.0))
         if told is None:
             continue
         proposals += 1
         motion = moved(told)
         lowest, highest = extremes(prepared, "displacement")
-        room = MEASURED * (highest - lowest)
+        room = RECORDED_ERROR * (highest - lowest)
         assert lowest - room <= motion.displacement.min(), records
         assert motion.displacement.max() <= highest + room, records
         speed = float(np.max(np.abs(motion.velocity)))
-        assert speed <= (1.0 + MEASURED) * max(map(abs, extremes(prepared, "velocity"))), records
+        assert speed <= (1.0 + RECORDED_ERROR) * max(map(abs, extremes(prepared, "velocity"))), records
         assert told.peak_speed_m_per_s == pytest.approx(speed, rel=1e-3)
         low, high = extremes(prepared, "force")
         for (_, damper), offset in zip(RIVALS, (-ALIKE_AT_1_HZ * middle, 0.0), strict=True):
@@ -163,7 +175,7 @@ def test_the_zero_of_the_displacement_moves_the_middle_of_the_test_and_nothing_e
     told = []
     for shift in (0.0, 0.05, -0.1):
         prepared = prepare((sine(2.0, 0.0183, shift), sine(0.7, 0.03, shift + 0.003)))
-        found = next_test(RIVALS, reach_of(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * shift, 0.0))
+        found = separating_test(RIVALS, operating_envelope(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * shift, 0.0))
         assert found is not None
         assert found.middle_m == pytest.approx(shift + 0.003, abs=2e-5)
         told.append(found.model_copy(update={"middle_m": None, "peak_force_N": None, "peak_speed_m_per_s": None}))
@@ -172,17 +184,17 @@ def test_the_zero_of_the_displacement_moves_the_middle_of_the_test_and_nothing_e
 
 def test_limits_rule_where_they_are_given_a_stroke_about_the_recorded_middle() -> None:
     prepared = prepare((sine(2.0, 0.01, 0.03, voltage=0.0), sine(2.0, 0.01, 0.03, voltage=100.0)))
-    assert reach_of(Limits(), prepared, (0.0, 100.0, 150.0)).voltages == pytest.approx((0.0, 100.0))
+    assert operating_envelope(Limits(), prepared, (0.0, 100.0, 150.0)).voltages == pytest.approx((0.0, 100.0))
     wide = Limits(stroke_m=0.1, speed_m_per_s=3.0, force_N=5e4, frequency_Hz=20.0, voltage_V=(-10.0, 200.0))
-    reach = reach_of(wide, prepared, (0.0, 150.0))
-    assert replace(reach, middle=0.0) == Reach(0.0, 0.05, 3.0, 20.0, (-5e4, 5e4), (0.0, 150.0))
-    assert reach.middle == pytest.approx(0.03, abs=1e-4)
-    assert reach_of(Limits(stroke_m=0.004), prepared, ()).amplitude == pytest.approx(0.002)
+    envelope = operating_envelope(wide, prepared, (0.0, 150.0))
+    assert replace(envelope, middle=0.0) == OperatingEnvelope(0.0, 0.05, 3.0, 20.0, (-5e4, 5e4), (0.0, 150.0))
+    assert envelope.middle == pytest.approx(0.03, abs=1e-4)
+    assert operating_envelope(Limits(stroke_m=0.004), prepared, ()).amplitude == pytest.approx(0.002)
 
 
 def test_an_amplitude_is_rounded_down_and_never_beyond() -> None:
     for amplitude in (0.0186549, 0.018659, 0.02, 0.0199999, 0.1 - 0.06, 0.03 - 0.01):
-        found = proposed(Reach(0.0, amplitude, 10.0, 1.3, ANY_FORCE))
+        found = proposed(OperatingEnvelope(0.0, amplitude, 10.0, 1.3, ANY_FORCE))
         assert found is not None
         left = [1.0 - found[2] / (share * amplitude) for share in STROKES]
         assert any(-1e-11 <= each < 0.01 for each in left), amplitude
@@ -190,7 +202,7 @@ def test_an_amplitude_is_rounded_down_and_never_beyond() -> None:
 
 def test_a_round_amplitude_stays_what_it_is_whatever_the_last_bit_of_a_difference() -> None:
     for amplitude in (0.02, 0.1 - 0.08, 0.03 - 0.01, 0.0199999999999999):
-        found = proposed(Reach(0.0, amplitude, 10.0, 1.3, ANY_FORCE))
+        found = proposed(OperatingEnvelope(0.0, amplitude, 10.0, 1.3, ANY_FORCE))
         assert found is not None
         assert found[2] in (0.003, 0.006, 0.012, 0.02)
 
@@ -203,8 +215,71 @@ def test_a_recorded_sine_of_round_stroke_and_frequency_is_proposed_as_it_is(samp
     v = 0.01 * 4.0 * np.pi * np.cos(4.0 * np.pi * time)
     record = Record("r", None, time, x, v, -((4.0 * np.pi) ** 2) * x, 900.0 * v)
     assert 0.5 * np.ptp(x) < 0.01
-    reach = reach_of(Limits(), prepare([record]), ())
-    assert (rounded_down(reach.amplitude), rounded_down(reach.frequency)) == (0.01, 2.0)
-    assert 0.01 * 4.0 * np.pi <= reach.speed <= 0.01 * 4.0 * np.pi * 1.005
-    limited = reach_of(Limits(stroke_m=0.01998, speed_m_per_s=0.1, frequency_Hz=1.999), prepare([record]), ())
+    envelope = operating_envelope(Limits(), prepare([record]), ())
+    assert (rounded_down(envelope.amplitude), rounded_down(envelope.frequency)) == (0.01, 2.0)
+    assert 0.01 * 4.0 * np.pi <= envelope.speed <= 0.01 * 4.0 * np.pi * 1.005
+    limited = operating_envelope(Limits(stroke_m=0.01998, speed_m_per_s=0.1, frequency_Hz=1.999), prepare([record]), ())
     assert (limited.amplitude, limited.speed, limited.frequency) == (0.00999, 0.1, 1.999)
+
+
+# --- Test at a voltage between two tested ones
+
+
+THREE = (0.0, 50.0, 150.0)
+TESTS = ((0.5, 0.02), (2.0, 0.03))
+LIMITS = Limits()
+
+
+def with_friction_at_50(T0: float) -> Damper:
+    """T0 is 301 N at 0 V and 1325 N at 150 V; C and k are on the line between both."""
+    low, middle, high = damper_of(THREE).base
+    on_line = {
+        name: (2.0 * getattr(low, name) + getattr(high, name)) / 3.0 for name in ("C_Ns_per_m", "k_N_per_m", "T0_N")
+    }
+    rows = (low, middle.model_copy(update={**on_line, "T0_N": T0}), high)
+    return Damper(base=rows)
+
+
+ON_THE_LINE = (2.0 * 301.0 + 1325.0) / 3.0
+
+
+def asked(damper: Damper, rng: np.random.Generator, limits: Limits = LIMITS) -> NextTest | None:
+    records = sines(damper, rng, [row.voltage_V or 0.0 for row in damper.base], tests=TESTS, cycles=4)
+    campaign = campaign_of(records)
+    validation = cross_validation_of(campaign, damper, 0.0025)
+    errors = validation.baseline_error(), validation.baseline_interpolation_error
+    envelope = operating_envelope(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
+    return intermediate_voltage_test(damper, 0.0, errors, validation, campaign.prepared, envelope, None)
+
+
+@pytest.mark.parametrize("T0", [0.6 * ON_THE_LINE, 1.5 * ON_THE_LINE])
+def test_a_test_is_proposed_half_way_along_the_wider_step(T0: float, rng: np.random.Generator) -> None:
+    found = asked(with_friction_at_50(T0), rng)
+    assert found is not None
+    assert found.between_voltage_V == (50.0, 150.0)
+    assert found.voltage_V == 100.0
+    assert any((found.frequency_Hz, found.amplitude_m) == pytest.approx(test, rel=0.01) for test in TESTS)
+    assert found.separates == ()
+
+
+def test_linear_parameters_need_no_test_between_voltages(rng: np.random.Generator) -> None:
+    assert asked(with_friction_at_50(ON_THE_LINE), rng) is None
+
+
+def test_without_a_voltage_between_two_others_no_test_is_proposed(rng: np.random.Generator) -> None:
+    assert asked(damper_of((0.0, 150.0)), rng) is None
+
+
+@pytest.mark.parametrize(
+    "limits", [Limits(voltage_V=(0.0, 90.0)), Limits(force_N=500.0)], ids=["the voltage", "the force"]
+)
+def test_no_test_beyond_the_limits_of_the_stand_is_proposed(limits: Limits, rng: np.random.Generator) -> None:
+    assert asked(with_friction_at_50(1.5 * ON_THE_LINE), rng, limits) is None
+
+
+def test_stroke_and_speed_stay_within_the_limits_of_the_stand(rng: np.random.Generator) -> None:
+    found = asked(with_friction_at_50(1.5 * ON_THE_LINE), rng, Limits(stroke_m=0.02, speed_m_per_s=0.05))
+    assert found is not None
+    assert found.amplitude_m == pytest.approx(0.01)
+    assert found.peak_speed_m_per_s is not None
+    assert found.peak_speed_m_per_s <= 0.05

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import damper_of, sines
-from test_kept_back import TWO
+from synthetic import TWO, damper_of, sines
 
 from pzd.compiled import sources
 from pzd.damper.confounders import known

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import damper_of, sine, waveform
 from scipy.integrate import solve_ivp
+from synthetic import TWO, damper_of, sine, waveform
 
 from pzd.damper.compose import respond
 from pzd.damper.effects.bouc_wen import hysteresis_after
@@ -16,9 +16,9 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Missed, deal, trials_of
+from pzd.diagnosis.cross_validation import PredictionError, assign_folds, cross_validation_of
 from pzd.diagnosis.data import prepare, split
-from pzd.diagnosis.peer_comparison import FittedTest, KeptBackTests, PeerFit, between_voltages, fit_peer
+from pzd.diagnosis.peer_comparison import HeldOutTests, PeerData, PeerFit, between_voltages, fit_peer
 from pzd.diagnosis.peers import Peer, PeerForm, StrokeMotion, peers
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -28,7 +28,7 @@ FORMS = [(peer, form) for peer in peers().values() for form in peer.forms]
 TRUE = {"kwok": (1500.0, 800.0, 500.0, 40.0, 90.0, 0.6), "bouc_wen": (1500.0, 800.0, 500.0, 40.0, 900.0, 3.0)}
 """Of a small magneto-rheological damper."""
 TESTS = ((0.5, 0.02), (1.0, 0.008), (2.0, 0.02))
-TWO, THREE = (0.0, 150.0), (0.0, 50.0, 100.0)
+THREE = (0.0, 50.0, 100.0)
 
 each_form = pytest.mark.parametrize(
     ("peer", "form"), FORMS, ids=[f"{peer.name} {form.label}".strip() for peer, form in FORMS]
@@ -42,13 +42,13 @@ def motion(frequency: float, amplitude: float, cycles: int = 3, rate: float = 40
     return StrokeMotion(x, v, 1.0 / rate, round(rate / frequency))
 
 
-def own_tests(peer: Peer, form: PeerForm, parameters: Array) -> list[FittedTest]:
+def own_tests(peer: Peer, form: PeerForm, parameters: Array) -> list[PeerData]:
     """Tests of which the force is the peer's own."""
     found = []
     for frequency, amplitude in TESTS:
         moved = motion(frequency, amplitude)
         force = peer.force(form, moved, parameters)
-        found.append(FittedTest(moved, force, np.ones(force.size, dtype=np.bool_)))
+        found.append(PeerData(moved, force, np.ones(force.size, dtype=np.bool_)))
     return found
 
 
@@ -113,7 +113,7 @@ def test_a_closed_loop_of_the_hysteresis_takes_up_energy(form: PeerForm, sigma: 
     assert 0.0 < work <= 4.0 * 0.01  # that of a dry friction of 1 N
 
 
-def test_a_parameter_is_on_the_line_between_voltages_and_held_beyond() -> None:
+def test_parameters_are_linear_between_voltages_and_constant_beyond() -> None:
     fits = {U: PeerFit(np.array([U, 10.0 - U]), 0.0, "converged") for U in (1.0, 3.0)}
     assert between_voltages(fits, 2.5) == pytest.approx([2.5, 7.5])
     assert between_voltages(fits, 9.0) == pytest.approx([3.0, 7.0])
@@ -122,22 +122,22 @@ def test_a_parameter_is_on_the_line_between_voltages_and_held_beyond() -> None:
 # ---------------------------------------------------------------- the comparison
 
 
-def kept_back_tests(records: Sequence[Record], voltages: Sequence[float] = TWO) -> KeptBackTests:
+def kept_back_tests(records: Sequence[Record], voltages: Sequence[float] = TWO) -> HeldOutTests:
     prepared = prepare(records)
-    return KeptBackTests(prepared, deal(prepared, damper_of(voltages)))
+    return HeldOutTests(prepared, assign_folds(prepared, damper_of(voltages)))
 
 
-def test_nothing_of_a_test_that_is_kept_back_is_fitted(rng: np.random.Generator) -> None:
+def test_no_peer_is_fitted_to_a_held_out_test(rng: np.random.Generator) -> None:
     records = [sine(damper_of(TWO), U, f, x, rng, cycles=3, rate=200.0) for U in TWO for f, x in TESTS]
     other = [replace(records[0], force=-3.0 * records[0].force), *records[1:]]
     before, after = kept_back_tests(records), kept_back_tests(other)
-    (fold,) = (fold for fold in before.dealt.folds if fold[0].any())
+    (fold,) = (fold for fold in before.folds.folds if fold[0].any())
     form = KWOK.forms[0]
     for group in range(len(TWO)):
         same = before.fitted(KWOK, form, group, fold).parameters
         assert after.fitted(KWOK, form, group, fold).parameters == pytest.approx(same, rel=1e-12)
-    seen = before.fitted(KWOK, form, 0, before.nothing).parameters
-    assert after.fitted(KWOK, form, 0, after.nothing).parameters != pytest.approx(seen, rel=0.1)
+    seen = before.fitted(KWOK, form, 0, before.no_samples).parameters
+    assert after.fitted(KWOK, form, 0, after.no_samples).parameters != pytest.approx(seen, rel=0.1)
 
 
 def peer_records(form: PeerForm, at: dict[float, Array], rng: np.random.Generator) -> list[Record]:
@@ -156,10 +156,10 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
     low, high = np.array(TRUE["bouc_wen"]), np.array([3000.0, 500.0, 900.0, 30.0, 600.0, 2.0])
     at = {U: low + U / 100.0 * (high - low) for U in THREE}
     tests = kept_back_tests(peer_records(BOUC_WEN.forms[1], at, rng), THREE)
-    left_out = tests.missed_between(BOUC_WEN, 1)
-    form, _ = tests.by_form(BOUC_WEN, tests.nothing, range(3))
+    left_out = tests.interpolation_error(BOUC_WEN, 1)
+    form, _ = tests.best_form(BOUC_WEN, tests.no_samples, range(3))
     assert form.label == "n = 2"
-    assert left_out.record == tests.groups[1][1]
+    assert left_out.records == tests.groups[1][1]
     assert left_out.criterion == pytest.approx(0.0, abs=1e-5)
     assert left_out.determination == pytest.approx(1.0, abs=1e-5)
 
@@ -180,17 +180,17 @@ def test_the_samples_compared_are_those_of_the_diagnosis(rng: np.random.Generato
     records.append(irregular(damper, TWO[0]))
     prepared, plain = prepare(records), damper_of(TWO)
     campaign = Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
-    trials = trials_of(campaign, plain, DiagnoseConfig().visible)
-    missed = trials.plain_missed()
-    prediction = trials.prediction(missed, missed, trials.plain_missed_between)
+    validation = cross_validation_of(campaign, plain, DiagnoseConfig().visible)
+    missed = validation.baseline_error()
+    prediction = validation.prediction(missed, missed, validation.baseline_interpolation_error)
     assert prediction is not None
     W_s = {each.record: each.W_s_plain for each in prediction.by}
     R2 = {each.record: each.R2_plain for each in prediction.by}
-    tests = KeptBackTests(prepared, deal(prepared, plain))
+    tests = HeldOutTests(prepared, assign_folds(prepared, plain))
     assert any(p.lead is None for p in prepared)
-    known = tests.known({i: W_s[p.record.name] for i, p in enumerate(prepared)})
+    known = tests.known_error({i: W_s[p.record.name] for i, p in enumerate(prepared)})
     assert known.criterion == pytest.approx(prediction.W_s_plain, rel=1e-9)
-    assert [known.of([i]).determination for i in range(len(prepared))] == pytest.approx(
+    assert [known.of_records([i]).determination for i in range(len(prepared))] == pytest.approx(
         [R2[p.record.name] for p in prepared], rel=1e-9
     )
 
@@ -199,9 +199,9 @@ def test_the_share_explained_is_1_of_a_perfect_prediction_and_0_of_the_mean_forc
     force = 3.0 + rng.standard_normal(500)
     squares = float(force @ force), float(np.sum((force - force.mean()) ** 2))
 
-    def missed(predicted: Array) -> Missed:
+    def missed(predicted: Array) -> PredictionError:
         residual = force - predicted
-        return Missed((0,), *(np.array([value]) for value in (residual @ residual, *squares, 0.0)))
+        return PredictionError((0,), *(np.array([value]) for value in (residual @ residual, *squares, 0.0)))
 
     assert missed(force).determination == 1.0
     assert missed(np.full(500, force.mean())).determination == pytest.approx(0.0, abs=1e-12)

@@ -6,19 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from campaign import damper_of
 from numpy.random import Generator
+from synthetic import damper_of
 
 from pzd.damper.compose import respond, sensors_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import prepare, split
-from pzd.diagnosis.fit.forces import left_at
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
-from pzd.diagnosis.fit.parameters import Problem
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.record import Array, Record
 from pzd.signals.kinematics import kinematics
 from pzd.signals.nuisance import NuisanceConfig
@@ -75,12 +74,12 @@ def whole(effects: dict[str, dict[str, float]], rng: Generator, *, moving: bool)
 
 @pytest.mark.parametrize("moving", [False, True], ids=["one voltage", "moving"])
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_they_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Generator) -> None:
+def test_residuals_and_jacobian_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Generator) -> None:
     """As the stand computes it from the config, and differenced with an exact path, by every searched variable."""
     problem, damper = whole({effect: EFFECTS[effect]}, rng, moving=moving)
     (o,), unknowns, x = problem.observations, problem.unknowns((effect,)), problem.start_with(damper)
     free = np.full(x.size, np.inf)
-    left = left_at(problem, unknowns, x, (-free, free))
+    left = linearise(problem, unknowns, x, (-free, free))
 
     def force(place: int, by: float, tolerance: float) -> Array:
         moved = x.copy()
@@ -88,14 +87,14 @@ def test_they_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Gene
         of = problem.point(moved, unknowns).damper
         sensors = sensors_of(of)
         prompt = of.model_copy(update={"effects": {n: e for n, e in of.effects.items() if n not in sensors}})
-        return o.at_compared(o.shown(respond(prompt, o.motion, o.begins_with, tolerance), sensors))
+        return o.at_compared(o.through_sensors(respond(prompt, o.motion, o.initial_force, tolerance), sensors))
 
     np.testing.assert_allclose(left.simulated[0], force(0, 0.0, SIMULATION_TOLERANCE), atol=1e-6 * o.peak)
-    counted = o.in_noise(o.measured - left.simulated[0])
+    counted = o.standardised(o.measured - left.simulated[0])
     np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-9, atol=1e-9)
     for j in range(x.size):
-        exact = o.in_noise(force(j, -2e-4, 1e-11) - force(j, 2e-4, 1e-11)) / 4e-4
-        missed = np.linalg.norm(left.slopes.dense()[:, j] - exact)
+        exact = o.standardised(force(j, -2e-4, 1e-11) - force(j, 2e-4, 1e-11)) / 4e-4
+        missed = np.linalg.norm(left.jacobian.dense()[:, j] - exact)
         assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))
 
 
@@ -105,6 +104,6 @@ def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) 
     start = asked.start_with(CHARGED)
     found = fit(asked, ("gas_spring",), start, evaluations=1)
     friction, _, _, charge = start
-    along = found.slopes.dense() @ np.array([friction, 1.0, 1.0, charge])
-    exact = [-o.in_noise(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
+    along = found.jacobian.dense() @ np.array([friction, 1.0, 1.0, charge])
+    exact = [-o.standardised(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
     assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)

@@ -4,7 +4,7 @@
 
 Records and parameters are made first and diagnose is compiled by an earlier process, so that neither counts. While it
 works, a thread looks every 5 ms where each of the others is: in a force (`pzd/damper`), in cleaning (`pzd/signals`,
-`pzd/diagnose/data`), or elsewhere. A thread that waits for another one does not count.
+`pzd/diagnosis/data.py`), or elsewhere. A thread that waits for another one does not count.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pzd.pipeline.stages import stages
 from pzd.record import sliced
 
 EVERY_S = 0.005
-CLEANING = ("pzd/signals/", "pzd/diagnosis/data/")
+CLEANING = ("pzd/signals/", "pzd/diagnosis/data.py")
 KERNELS = ("pzd/damper/",)
 WAITING = ("/threading.py", "/concurrent/futures/thread.py", "/concurrent/futures/_base.py")
 

@@ -37,19 +37,18 @@ from pzd.blind.score import counted_effects
 from pzd.config import RunConfig, load
 from pzd.damper.effect import Effect
 from pzd.damper.model import Damper
-from pzd.diagnosis import campaign, cross_validation, thresholds
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis import cross_validation, gap, thresholds
+from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Trials
-from pzd.diagnosis.data import about, prepare, split, whole_records
-from pzd.diagnosis.fit.least_squares import Fitted, fit, misfit_of
-from pzd.diagnosis.fit.likelihood import RecordLikelihood
-from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.cross_validation import CrossValidation
+from pzd.diagnosis.data import centred_on, prepare, split, unsaturated_records
+from pzd.diagnosis.fit.least_squares import FitResult, fit, profiled_misfit
+from pzd.diagnosis.fit.likelihood import WeightedRecord
+from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import promise
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.search.candidates import promised_drop
 from pzd.diagnosis.search.forward_selection import select_effects
-from pzd.diagnosis.verdict import concluded
+from pzd.diagnosis.verdict import conclude
 from pzd.identification.stage import identify
 from pzd.record import mid_stroke
 from pzd.rig.config import FilesEntry, RigConfig
@@ -63,7 +62,7 @@ IN_CONFIG = (
     *("adopt_bic", "rival_bic", "most_effects", "most_added"),
 )
 CHANCES = ("significance", "HALVES_SIGNIFICANCE", "CYCLE_CHANGE_SIGNIFICANCE")
-AFTER = ("verdict", "missed", "handed_on", "added_by_prediction", "trends_of_tests", "hypotheses.regression")
+AFTER = ("verdict", "cross_validation", "adoption", "hypotheses.regression")
 """Modules of pzd.diagnosis that act on a search that is over."""
 AFTER_IN_CONFIG = ("unexplained_share", "most_added")
 
@@ -112,28 +111,29 @@ class Kept:
             return given.model_dump_json()
         if isinstance(given, Effect):
             return given.name
-        if isinstance(given, Problem | RecordLikelihood | Fitted | Campaign):
+        if isinstance(given, Problem | WeightedRecord | FitResult | Campaign):
             if id(given) not in self.held:  # the object is held as well, so that no other one takes its number
                 self.held[id(given)] = given, sha256(pickle.dumps(self._content(given))).hexdigest()
             return self.held[id(given)][1]
         return given if isinstance(given, Hashable) else tuple(given)
 
-    def _content(self, given: Problem | RecordLikelihood | Fitted | Campaign) -> tuple[object, ...]:
+    def _content(self, given: Problem | WeightedRecord | FitResult | Campaign) -> tuple[object, ...]:
         if isinstance(given, Campaign):
             return (id(given),)
         if isinstance(given, Problem):
             rows = tuple(row.model_dump_json() for row in given.base)
-            rest = given.scales, given.fastest, given.reference, sorted(given.varying)
+            rest = given.scales, given.largest_rate, given.reference_temperature, sorted(given.per_voltage)
             return (*map(self._said, given.observations), rows, repr(rest))
-        if isinstance(given, Fitted):
-            return given.damper.model_dump_json(), given.effects, given.searched.tobytes(), repr(given.misfit)
-        arrays = given.compared, given.measured, given.weights, given.frame, given.shrink
-        return given.name, given.place, given.first, given.stride, *(array.tobytes() for array in arrays)
+        if isinstance(given, FitResult):
+            return given.damper.model_dump_json(), given.effects, given.optimum.tobytes(), repr(given.misfit)
+        nuisances = given.nuisances.inner, given.nuisances.covariance
+        arrays = given.sample_indices, given.compared, given.measured, given.weights, *nuisances
+        return given.name, given.base_row, given.initial_force, *(array.tobytes() for array in arrays)
 
 
 def keep_fits() -> None:
     """Let every module of the diagnosis ask for its fits where they are kept."""
-    for function in (fit, misfit_of, promise, evidence_of, cross_validation.trials_of):
+    for function in (fit, profiled_misfit, promised_drop, evidence_of, cross_validation.cross_validation_of):
         kept = Kept(function)
         for key, module in list(sys.modules.items()):
             for name, value in list(vars(module).items()) if key.startswith("pzd.diagnosis.") else ():
@@ -146,7 +146,7 @@ class Searched:
     """A search that is over."""
 
     selection: Selection
-    trials: Trials
+    validation: CrossValidation
 
 
 def names() -> tuple[str, ...]:
@@ -196,14 +196,14 @@ def instead(name: str, factor: float, config: DiagnoseConfig) -> Iterator[Diagno
 
 def searched(case: Case, config: DiagnoseConfig, *, checked: bool) -> Searched:
     """The search of a case, as the stage does it; with the residuals that were checked before, where these stand."""
-    campaign = case.campaign if checked else replace(case.campaign, _expected={}, _checks={})
-    trials = cross_validation.trials_of(campaign, case.plain, config.visible)
-    return Searched(select_effects(campaign, case.plain, config, 1), trials)
+    campaign = case.campaign if checked else replace(case.campaign, _predictions={}, _checks={})
+    validation = cross_validation.cross_validation_of(campaign, case.plain, config.visible)
+    return Searched(select_effects(campaign, case.plain, config, 1), validation)
 
 
 def answered(found: Searched, config: DiagnoseConfig) -> Answer:
     """What is said of a search."""
-    handed, decision = concluded(found.selection, found.trials, config, "V")
+    handed, decision = conclude(found.selection, found.validation, config, "V")
     return decision.verdict, frozenset(handed.selection.adopted), frozenset(handed.selection.rivals)
 
 
@@ -236,8 +236,8 @@ def prepared_case(config: RunConfig, setup: BenchmarkSetup, case: PlannedCase) -
         truth = read_json(places.truth(case.id), Truth, setup.control)
         rig = ingest(RigConfig(files=(FilesEntry(path="rig/*.csv"),)), setup.control, places.case(case.id))
         identified = identify(config.identify, rig, config.seed)
-        recorded = prepare(whole_records(rig, None)[0])
-    prepared = about(recorded, mid_stroke(each.record.displacement for each in recorded))
+        recorded = prepare(unsaturated_records(rig, None)[0])
+    prepared = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
     group = config.identify.group
     parts = split(prepared, group.voltage_V, group.temperature_degC)
     return Case(truth, Campaign(prepared, parts, config.diagnose.nuisance), base_of(identified.rows, None))
@@ -260,7 +260,7 @@ def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, f
     for name in names():
         for factor in (0.5, 2.0):
             with instead(name, factor, config.diagnose) as other:
-                checked = campaign not in users(name)
+                checked = gap not in users(name)
                 found = stands if acts_after(name) else searched(prepared, other, checked=checked)
                 answer = answered(found, other)
             outcomes[name, factor] = judged(answer)

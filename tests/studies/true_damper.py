@@ -20,11 +20,11 @@ from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import plan
 from pzd.config import RunConfig
 from pzd.damper.model import Damper
-from pzd.diagnosis.campaign import Campaign, probability_of_noise, visible_gap
-from pzd.diagnosis.data import about, prepare, split, whole_records
+from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.data import centred_on, prepare, split, unsaturated_records
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.parameters import Work
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.fit.problem import Budget
+from pzd.diagnosis.gap import probability_of_noise, visible_gap
 from pzd.identification.stage import identify
 from pzd.pipeline.command import opened
 from pzd.record import mid_stroke
@@ -52,12 +52,12 @@ def left_by_the_truth(config: RunConfig, setup: BenchmarkSetup, folder: Path, tr
     stand = RigConfig(files=(FilesEntry(path="rig/*.csv"),), limits=config.rig.limits)
     rig = ingest(stand, setup.control, folder)
     identified = identify(config.identify, rig, config.seed)
-    recorded = prepare(whole_records(rig, None)[0])
-    prepared = about(recorded, mid_stroke(each.record.displacement for each in recorded))
+    recorded = prepare(unsaturated_records(rig, None)[0])
+    prepared = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
     parts = split(prepared, config.identify.group.voltage_V, config.identify.group.temperature_degC)
-    campaign = Campaign(prepared, parts, config.diagnose.nuisance, 1, Work(config.diagnose.most_evaluations))
+    campaign = Campaign(prepared, parts, config.diagnose.nuisance, 1, Budget(config.diagnose.most_evaluations))
     whole = evidence_of(campaign, base_of(identified.rows, None)).whole
-    of_voltages = whole if len(whole.base) == len(truth.base) else whole.pooled()  # the truth has no temperature axis
+    of_voltages = whole if len(whole.base) == len(truth.base) else whole.pooled_temperatures()  # the truth has no temperature axis
     found = fit(of_voltages, tuple(truth.effects), of_voltages.start_with(truth), MOST_STEPS)
     checks = campaign.checks(found.damper)
     return Left(visible_gap(checks), probability_of_noise(checks))

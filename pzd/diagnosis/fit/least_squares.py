@@ -1,7 +1,7 @@
-"""A damper with some effects fitted to observations: T0, C, k of every base row together with the effects.
+"""Least-squares fit of T0, C and k of every base row together with some effects, and its standard errors.
 
-Every residual is in units of noise with the tests' nuisances integrated out, so that half the sum of
-squares is minus the logarithm of the likelihood, and fits of different effects can be compared.
+Every residual is in units of noise with the tests' nuisances integrated out, so that half the sum of squares is minus
+the logarithm of the likelihood, and fits of different effects can be compared.
 """
 
 from __future__ import annotations
@@ -13,70 +13,67 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from pzd.damper.model import Damper
-from pzd.diagnosis.fit.forces import BlockSlopes, Left, left_at, moving
-from pzd.diagnosis.fit.parameters import Problem, Unknown
+from pzd.diagnosis.fit.problem import Problem, Unknown
+from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-
-
 MOST_EVALUATIONS = 20
-"""Evaluations of the model in a search, at most, unless said otherwise.
+"""Most evaluations of the model in a search, unless said otherwise.
 
 Reason: time; what is adopted is searched on, see `thresholds.MOST_EVALUATIONS_OF_BEST`."""
 PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends.
 
 Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bic` asks for."""
-STIFFER = 2.0
-"""By this factor the search may exceed the fastest element.
+STIFFNESS_MARGIN = 2.0
+"""Factor by which the search may exceed the largest rate k/C.
 
-Reason: room for an optimum at the limit that identify found; a stiffer element cannot be told from a rigid one by
-these samples."""
-USUAL = 1.5
-"""Prior standard deviation of ln C and ln k about their starting values: holds a row still where the tests do not
-show it (C under an open relief valve, k of a soft drive), and nowhere else.
+Reason: a margin for an optimum at the limit that identify found; these samples do not distinguish a stiffer element
+from a rigid one."""
+PRIOR_DEVIATION = 1.5
+"""Prior standard deviation of ln C and ln k about their starting values: fixes a row where the tests do not show it (C
+under an open relief valve, k of a soft drive), and nowhere else.
 
 Reason: a factor of e^1.5 = 4.5 either way is no surprise between what identify reads from loops and an optimum with an
 effect beside it."""
-WIDEST = 3.0
+LARGEST_LOG_RATIO = 3.0
 """C and k stay within e^3 = 20 times their starting values.
 
-Reason: two standard deviations of `USUAL`; what ends there is not shown by the tests."""
+Reason: two standard deviations of the prior; what ends there is not shown by the tests."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """An optimum: the damper, and what it leaves."""
+class FitResult:
+    """A least-squares optimum: the damper, its residuals and its Jacobian."""
 
     damper: Damper
     effects: tuple[str, ...]
-    searched: Array
+    optimum: Array
     """(3 b + e,) the optimum in the units of the search."""
     residuals: tuple[Array, ...]
-    """(w,) an observation, in units of noise."""
+    """(w,) per observation, in units of noise."""
     simulated: tuple[Array, ...]
-    """(n,) an observation, force at the compared samples [N]."""
+    """(n,) per observation, force at the compared samples [N]."""
     unknowns: tuple[Unknown, ...]
     prior: Array
-    """(2 b, 3 b + e) slopes of the prior on C and k."""
-    derive: Callable[[], BlockSlopes]
-    """Gives `slopes`, which of all candidates together would fill the memory."""
+    """(2 b, 3 b + e) Jacobian of the prior on C and k."""
+    derive_jacobian: Callable[[], BlockJacobian]
+    """Computes `jacobian`, which of all candidates together would fill the memory."""
 
     @cached_property
-    def slopes(self) -> BlockSlopes:
-        """Of all residuals by the searched variables."""
-        return self.derive()
+    def jacobian(self) -> BlockJacobian:
+        """Of all residuals by the search variables."""
+        return self.derive_jacobian()
 
     @cached_property
-    def frame(self) -> Array:
-        """(w, 3 b + e) orthonormal columns: what of a residual the searched variables can take up."""
-        return np.asarray(np.linalg.qr(self.slopes.dense()).Q)
+    def column_basis(self) -> Array:
+        """(w, 3 b + e) orthonormal basis of the columns of the Jacobian."""
+        return np.asarray(np.linalg.qr(self.jacobian.dense()).Q)
 
     @cached_property
     def covariance(self) -> Array:
-        """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
-        return _covariance(np.concatenate([self.slopes.dense(), self.prior]))
+        """(3 b + e, 3 b + e) covariance of the search variables by noise alone; infinite where no test shows one."""
+        return _covariance(np.concatenate([self.jacobian.dense(), self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -89,20 +86,20 @@ class Fitted:
         return sum(r.size for r in self.residuals)
 
 
-def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
-    """The optimum reached from a starting point, by trust-region least squares within the limits.
+def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> FitResult:
+    """Fit a damper with some effects by trust-region least squares within the limits, from a starting point.
 
     Parameters
     ----------
-    problem : what is fitted to what
-    effects : names of the effects fitted together with the base rows
+    problem : observations and starting values
+    effects : names of the effects fitted with the base rows
     start : (3 b + e,) in the units of the search
     evaluations : of the model, at most
     """
     unknowns = problem.unknowns(effects)
     found, left = _search(problem, unknowns, start, start.size, evaluations)
     limits = _bounds(problem, unknowns)
-    return Fitted(
+    return FitResult(
         problem.point(found, unknowns).damper,
         tuple(effects),
         found,
@@ -110,81 +107,81 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
         left.simulated,
         unknowns,
         _prior(problem, len(unknowns)),
-        lambda: left_at(problem, unknowns, found, limits).slopes,
+        lambda: linearise(problem, unknowns, found, limits).jacobian,
     )
 
 
-def not_taken_up(frame: Array, values: Array) -> Array:
-    """(w,) or (w, c) what of some values orthonormal columns (w, p), such as `Fitted.frame`, do not give."""
+def projected_out(frame: Array, values: Array) -> Array:
+    """Project values (w,) or (w, c) onto the complement of orthonormal columns (w, p)."""
     return values - frame @ (frame.T @ values)
 
 
-def misfit_of(problem: Problem, damper: Damper) -> float:
-    """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
+def profiled_misfit(problem: Problem, damper: Damper) -> float:
+    """Return the smallest misfit over T0, C and k while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
     _, left = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
-    return float(left.whole @ left.whole)
+    return float(left.stacked @ left.stacked)
 
 
 def _search(
     problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
-) -> tuple[Array, Left]:
-    """Where a search over the first `free` variables ends, (3 b + e,), and what is left there.
+) -> tuple[Array, Linearisation]:
+    """Minimise over the first `free` variables; return the (3 b + e,) optimum and the linearisation there.
 
-    Those that no observation moves with, such as T0 of a voltage that is left out, stay where they are: at large, one
-    wanders between its limits, and where it meets one the step of all ends.
+    Variables that no observation depends on, such as T0 of a left-out voltage, stay where they are: free, one wanders
+    between its limits, and where it meets one the step of all variables ends.
     """
     from scipy.optimize import least_squares
 
     low, high = _bounds(problem, unknowns)
     begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
-    centre, prior = problem.start(), _prior(problem, len(unknowns))
-    moved = sorted({j for o in problem.observations for j in moving(problem, unknowns, o, free)})
+    start_of_rows, prior = problem.start(), _prior(problem, len(unknowns))
+    active = sorted({j for o in problem.observations for j in active_columns(problem, unknowns, o, free)})
 
-    def whole(x: Array) -> Array:
+    def all_variables(x: Array) -> Array:
         at = begin.copy()
-        at[moved] = x
+        at[active] = x
         return at
 
     @lru_cache(maxsize=2)  # where the search is, and where it tries to go
-    def left_by(x: bytes) -> Left:
-        return left_at(problem, unknowns, whole(np.frombuffer(x)), limits)
+    def linearised_at(x: bytes) -> Linearisation:
+        return linearise(problem, unknowns, all_variables(np.frombuffer(x)), limits)
 
     def residuals_at(x: Array) -> Array:
-        away = whole(x)[: centre.size] - centre
-        return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ away])
+        away = all_variables(x)[: start_of_rows.size] - start_of_rows
+        return np.concatenate([linearised_at(x.tobytes()).stacked, prior[:, : start_of_rows.size] @ away])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([left_by(x.tobytes()).slopes.dense(moved), prior[:, moved]])
+        return np.concatenate([linearised_at(x.tobytes()).jacobian.dense(active), prior[:, active]])
 
     found = least_squares(
         residuals_at,
-        begin[moved],
+        begin[active],
         jac=slopes_at,
-        bounds=(low[moved], high[moved]),
+        bounds=(low[active], high[active]),
         x_scale="jac",
         ftol=PRECISION,
         xtol=PRECISION,
         gtol=PRECISION,
         max_nfev=evaluations,
     )
-    return whole(found.x), left_by(found.x.tobytes())
+    return all_variables(found.x), linearised_at(found.x.tobytes())
 
 
 def _prior(problem: Problem, effects: int) -> Array:
-    """(2 b, 3 b + e) slopes of the prior on ln C and ln k of every base row, in its standard deviations."""
+    """Return the (2 b, 3 b + e) Jacobian of the prior on ln C and ln k, in its standard deviations."""
     rows = len(problem.base)
     columns = [3 * row + i for row in range(rows) for i in (1, 2)]
-    return np.eye(3 * rows + effects)[columns] / USUAL
+    return np.eye(3 * rows + effects)[columns] / PRIOR_DEVIATION
 
 
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
-    """Base rows within a ratio of where they start: far from there lie only stiff or dead dampers."""
+    """Return the limits of the search: rows within a ratio of their start, beyond which dampers are rigid or dead."""
     start = problem.start().reshape(-1, 3)
-    low, high = start - WIDEST, start + WIDEST
+    low, high = start - LARGEST_LOG_RATIO, start + LARGEST_LOG_RATIO
     low[:, 0], high[:, 0] = 0.0, 2.0
-    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFER * problem.fastest))
+    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFNESS_MARGIN * problem.largest_rate))
     limits = [u.bounds for u in unknowns]
     return (
         np.array([*low.ravel(), *(lower for lower, _ in limits)]),
@@ -193,40 +190,41 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
 
 
 def _covariance(jacobian: Array) -> Array:
-    """(p, p) covariance of what was searched; infinite for what no residual shows."""
+    """Return the (p, p) covariance of the search variables; infinite where no residual shows one."""
     size = np.linalg.norm(jacobian, axis=0)
-    unseen = size == 0.0
-    size[unseen] = 1.0
+    unconstrained = size == 0.0
+    size[unconstrained] = 1.0
     scaled = jacobian / size
     whole: Array = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
-    whole[unseen, unseen] = np.inf
+    whole[unconstrained, unconstrained] = np.inf
     return whole
 
 
-# ----------------------------------------------------------------------------------------------------
-# How well a fit knows T0, C, k and the effects: by noise and sensors, and by how far the tests disagree.
+# --- Standard errors and intervals
 
 
 LEVEL = 1.96
-"""Standard errors in a 95 % interval."""
-SILENT = 1e-6
-"""A test that leaves less than this share of its own pull on a parameter to chance says nothing of disagreement."""
+"""Half width of a 95 % interval in standard errors."""
+UNINFORMATIVE = 1e-6
+"""Share of chance in a test's pull on a parameter, below which the test says nothing of disagreement."""
 
 
-def standard_errors(fitted: Fitted) -> Array:
-    """(e,) of the effect parameters in their own units, wider where the fit leaves more than noise or tests disagree.
+def standard_errors(fitted: FitResult) -> Array:
+    """Compute the (e,) standard errors of the effect parameters in their own units.
+
+    They are wider where the fit leaves more than noise or the tests disagree.
 
     Equation: s_j^2 = C_jj max(1, |r|^2 / (n - p), R_j)             Source: Birge 1932, Phys. Rev. 40, 207
     """
-    of_effects = slice(fitted.searched.size - len(fitted.unknowns), fitted.searched.size)
-    searched = fitted.searched[of_effects]
-    slopes = np.array([u.slope(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
-    errors: Array = np.abs(slopes) * _searched_errors(fitted, of_effects)
+    of_effects = slice(fitted.optimum.size - len(fitted.unknowns), fitted.optimum.size)
+    searched = fitted.optimum[of_effects]
+    slopes = np.array([u.derivative(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
+    errors: Array = np.abs(slopes) * _search_errors(fitted, of_effects)
     return errors
 
 
-def base_half_widths(fitted: Fitted, force: float) -> Array:
-    """(b, 3) half widths of the 95 % intervals of T0, C and k of every base row, the effects free beside them.
+def base_half_widths(fitted: FitResult, force: float) -> Array:
+    """Compute the (b, 3) half widths of the 95 % intervals of T0, C and k of every base row, the effects free.
 
     Equation: 1.96 s, s as in `standard_errors`; of C and k from that of their logarithm, to first order
 
@@ -235,22 +233,22 @@ def base_half_widths(fitted: Fitted, force: float) -> Array:
     fitted : the optimum
     force : unit of T0 in the search [N]
     """
-    of_base = slice(0, fitted.searched.size - len(fitted.unknowns))
+    of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
     units = np.array([(force, row.C_Ns_per_m, row.k_N_per_m) for row in fitted.damper.base])
-    widths: Array = LEVEL * _searched_errors(fitted, of_base).reshape(-1, 3) * units
+    widths: Array = LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units
     return widths
 
 
-def _searched_errors(fitted: Fitted, of: slice) -> Array:
-    """Standard errors of some of what was searched, in the units of the search."""
-    freedom = max(fitted.size - fitted.searched.size, 1)
+def _search_errors(fitted: FitResult, of: slice) -> Array:
+    """Compute the standard errors of some search variables."""
+    freedom = max(fitted.size - fitted.optimum.size, 1)
     wider = np.maximum(disagreement(fitted, of), max(1.0, fitted.misfit / freedom))
     errors: Array = np.sqrt(np.diag(fitted.covariance)[of] * wider)
     return errors
 
 
-def disagreement(fitted: Fitted, of: slice) -> Array:
-    """How far the tests pull some of the parameters apart, over what noise alone lets them: about one.
+def disagreement(fitted: FitResult, of: slice) -> Array:
+    """Compute how far the tests pull some parameters apart, relative to what noise alone lets them: about one.
 
     Equation: R = sum_t c_t^2 / sum_t var c_t, c_t = C J_t' r_t, var c_t = C J_t' (I - J_t C J_t') J_t C
                         Source: cluster-robust variance over its expectation; Bell and McCaffrey 2002, Surv. Meth. 28
@@ -258,11 +256,11 @@ def disagreement(fitted: Fitted, of: slice) -> Array:
     covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
     ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
     pulled, allowed = np.zeros(of.stop - of.start), np.zeros(of.stop - of.start)
-    for slopes, residual in zip(np.split(fitted.slopes.dense(), ends), fitted.residuals, strict=True):
+    for slopes, residual in zip(np.split(fitted.jacobian.dense(), ends), fitted.residuals, strict=True):
         pull = slopes @ covariance[:, of]
         own, shared = np.sum(pull**2, axis=0), slopes.T @ pull
         chance = own - np.sum(shared * (covariance @ shared), axis=0)
-        counts = chance > SILENT * own
+        counts = chance > UNINFORMATIVE * own
         pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
         allowed += np.where(counts, chance, 0.0)
     return np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)

@@ -1,9 +1,8 @@
-"""One record as the evidence weighs it: what is simulated, what it is held against, and in which units of noise.
+"""Weighted records: simulated motion, measured force and the units of noise in which residuals count.
 
-A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in
-units of its own noise; any other is its samples, whitened. What offset, gain and delay of the test
-may explain within their priors is taken out of both sides once and for all, so that a residual
-that is left counts as it should: |r|^2 is minus twice the logarithm of the likelihood.
+A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in units of its own noise;
+any other is its samples, whitened by an autoregression. What offset, gain and delay of the test may explain within
+their priors is integrated out, so that |r|^2 of the residual r is minus twice the logarithm of the likelihood.
 """
 
 from __future__ import annotations
@@ -17,58 +16,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moments
+from pzd.damper.material import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.parameter_rows import effective_voltage
-from pzd.diagnosis.data import Prepared
-from pzd.diagnosis.fit.prediction import Predicted, motion_of, warms
+from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.fit.prediction import PredictedForce, simulation_motion, temperature_moves
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
-from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, jumps_in_samples
-from pzd.signals.lack_of_fit import fit_smooth_residual
-from pzd.signals.measures import reversals
-from pzd.signals.noise import Autoregression, PureError, pure_error
+from pzd.signals.jumps import jumps, jumps_in_samples, slope_within, unbroken
+from pzd.signals.noise import Autoregression, PureError, fit_smooth_residual, pure_error
 from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.smoothing import reversals
 
-# ----------------------------------------------------------------------------------------------------
-# What the nuisances of a test may explain within their priors, taken out of residuals once and for all.
-#
-# Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
-# Source: Gaussian prior, marginal likelihood
+# --- Nuisances
 
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-HIDDEN = 1e-3
+NEGLIGIBLE_NUISANCE = 1e-3
 """A nuisance that moves all residuals together by less [standard deviations of one] is left out.
 
 Reason: it would change the misfit by a millionth."""
 SPARSE = 0.2
-"""Share of numbers other than zero up to which the columns are kept as these alone.
+"""Share of nonzero numbers up to which the columns are stored sparse.
 
 Reason: a column for a sample beside a jump has as many as the noise remembers; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
-class IntegratedOut:
-    """Nuisances of a test, and how much of what they could explain is taken out."""
+class MarginalisedNuisances:
+    """Nuisances of a test with Gaussian priors, integrated out of the residuals.
+
+    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
+                                                                            Source: Gaussian prior, marginal likelihood
+
+    Examples
+    --------
+    A nuisance that moves the first residual by three standard deviations of noise:
+
+    >>> nuisances = MarginalisedNuisances.from_columns(np.array([[3.0], [0.0]]))
+    >>> nuisances.marginalised(np.array([1.0, 1.0])).round(3).tolist()
+    [0.316, 1.0]
+    """
 
     columns: Array | csr_array
-    """(w, p) what each does to the residuals at one standard deviation, in units of noise."""
+    """(w, p) change V of the residuals by one standard deviation of each nuisance, in units of noise."""
     inner: Array
     """(p, p) M."""
     covariance: Array
-    """(p, p) of the nuisances once the residuals are known: R diag(1/(1 + s^2)) R'."""
+    """(p, p) posterior covariance of the nuisances: R diag(1/(1 + s^2)) R'."""
 
     @classmethod
-    def of(cls, columns: Array) -> IntegratedOut:
-        """Of some nuisances (w, p); what lies below `HIDDEN` is left in.
+    def from_columns(cls, columns: Array) -> MarginalisedNuisances:
+        """Prepare some nuisances (w, p), without those below `NEGLIGIBLE_NUISANCE`.
 
         By the eigenvalues of the (p, p) products, which lose nothing of what shows.
         """
         squares, right = np.linalg.eigh(columns.T @ columns)
-        shown = squares > HIDDEN**2
+        shown = squares > NEGLIGIBLE_NUISANCE**2
         squares, right = squares[shown], right[:, shown]
         return cls(
             _packed(columns),
@@ -77,18 +83,18 @@ class IntegratedOut:
         )
 
     @classmethod
-    def nothing(cls, residuals: int) -> IntegratedOut:
-        """No nuisances of so many residuals."""
+    def none(cls, residuals: int) -> MarginalisedNuisances:
+        """Prepare no nuisances for so many residuals."""
         return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 
-    def taken_out(self, values: Array) -> Array:
-        """(w,) or (w, k) values in units of noise, without what the nuisances may explain of them."""
+    def marginalised(self, values: Array) -> Array:
+        """Return values (w,) or (w, k) in units of noise with the nuisances integrated out."""
         if not self.inner.size:
             return values
         return np.asarray(values - self.columns @ (self.inner @ (self.columns.T @ values)))
 
-    def likeliest(self, values: Array) -> Array:
-        """(p,) the likeliest nuisances [standard deviations], given residuals (w,) that they are not taken out of."""
+    def most_likely(self, values: Array) -> Array:
+        """Return the (p,) most likely nuisances [standard deviations], given residuals (w,) before marginalisation."""
         return np.asarray(self.covariance @ (self.columns.T @ values))
 
 
@@ -100,31 +106,31 @@ def _packed(columns: Array) -> Array | csr_array:
     return csr_array(columns)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Weighted records
 
 
 SIMULATION_TOLERANCE = 1e-7
-"""Of the damper's path, as a share of the force, in every step by itself.
+"""Tolerance of the path of the element, as a share of the force, in every step by itself.
 
-Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a way down.
+Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a descent.
 Looser, it would hardly be faster: most steps of a record lie in one piece."""
-REMEMBERED = 4
-"""Effective voltages kept: slopes by a parameter of the drive need three."""
+CACHED_VOLTAGES = 4
+"""Effective voltages kept in the cache: derivatives by a parameter of the drive need three."""
 
 
 @dataclass(frozen=True, eq=False)
-class RecordLikelihood:
-    """What one record, or a part of it, says."""
+class WeightedRecord:
+    """One record, or part of one, with its weights: an observation of the least-squares problem."""
 
     name: str
-    place: int
-    """Which base row it belongs to; -1 where the voltage moves."""
+    base_row: int
+    """Index of its base row; -1 where the voltage moves."""
     motion: Motion
-    """(m,) what is simulated."""
-    begins_with: float
+    """(m,) simulated motion."""
+    initial_force: float
     """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
-    places: Rows
-    """(s,) samples of the motion at which it was recorded, from the first one compared to the last."""
+    sample_indices: Rows
+    """(s,) recorded samples among those of the motion, from the first one compared to the last."""
     compared: NDArray[np.bool_]
     """(s,) which of them are compared: n of them, in one stretch or several."""
     measured: Array
@@ -134,7 +140,7 @@ class RecordLikelihood:
     noise: PureError | Autoregression
     weights: Array
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
-    nuisances: IntegratedOut
+    nuisances: MarginalisedNuisances
     """Offset, gain and delay of the test, and its jumps."""
 
     @cached_property
@@ -144,8 +150,8 @@ class RecordLikelihood:
 
     @cached_property
     def effective_voltage(self) -> Callable[[bytes], Array]:
-        """(m,) effective voltage [V] by the row of the drive, (d,) as bytes; the same array for the same row."""
-        return lru_cache(REMEMBERED)(self._followed)
+        """Function from the row of the drive, (d,) as bytes, to the (m,) effective voltage [V]; cached."""
+        return lru_cache(CACHED_VOLTAGES)(self._followed)
 
     def _followed(self, row: bytes) -> Array:
         voltage = self.motion.voltage
@@ -154,29 +160,31 @@ class RecordLikelihood:
         return effective_voltage(voltage, self.steps, np.frombuffer(row).copy())
 
     def at_compared(self, simulated: Array) -> Array:
-        """(n,) or (n, p) of what was simulated at the samples that are compared."""
-        return simulated[self._compared_places]
+        """Select the (n,) or (n, p) simulated values at the compared samples."""
+        return simulated[self._compared_indices]
 
     @cached_property
-    def _compared_places(self) -> Rows:
-        return self.places[self.compared]
+    def _compared_indices(self) -> Rows:
+        return self.sample_indices[self.compared]
 
-    def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
-        """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
+    def through_sensors(
+        self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], delay: float = 0.0
+    ) -> Array:
+        """Return simulated values, (m,) or (m, p), as a channel shows them, by a cubic between the samples.
 
         Parameters
         ----------
         simulated : (m,) force [N], or (m, p) of them
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
-        late : how much later yet the channel shows it [s]
+        delay : further delay of the channel [s]
         """
         from scipy.interpolate import CubicSpline
 
-        if not sensors and late == 0.0:
+        if not sensors and delay == 0.0:
             return simulated
-        begin = int(self.places[0]) if isinstance(self.noise, PureError) else 0
+        begin = int(self.sample_indices[0]) if isinstance(self.noise, PureError) else 0
         time = self.motion.time[begin:]
-        shown = shown_moments(sensors, time - late)
+        shown = shown_moments(sensors, time - delay)
         if np.array_equal(shown, time):
             return simulated
         if begin == 0:
@@ -186,16 +194,14 @@ class RecordLikelihood:
         cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
         return np.concatenate([simulated[:begin], cycle(shown)])
 
-    def in_noise(self, values: Array) -> Array:
-        """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
-        return self.nuisances.taken_out(self._scaled(values))
+    def standardised(self, values: Array) -> Array:
+        """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
+        return self.nuisances.marginalised(self._scaled(values))
 
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
         """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
-        return has_predecessors(
-            self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0
-        )
+        return unbroken(self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0)
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
@@ -205,103 +211,105 @@ class RecordLikelihood:
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-def response(observation: RecordLikelihood, damper: Damper) -> Array:
-    """(n,) force that a damper gives at the compared samples [N]."""
-    return responses(observation, damper)(0.0)
+def simulated_force(observation: WeightedRecord, damper: Damper) -> Array:
+    """Simulate the (n,) force of a damper at the compared samples [N]."""
+    return delayed_forces(observation, damper)(0.0)
 
 
-def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
-    """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
+def delayed_forces(observation: WeightedRecord, damper: Damper) -> Callable[[float], Array]:
+    """Simulate the (n,) force of a damper at the compared samples [N], as a function of a further delay [s]."""
     o, sensors = observation, sensors_of(damper)
     prompt = damper.without_effects(*sensors)
-    force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
-    return lambda late: o.at_compared(o.shown(force, sensors, late))
+    force = respond(prompt, o.motion, o.initial_force, SIMULATION_TOLERANCE)
+    return lambda late: o.at_compared(o.through_sensors(force, sensors, late))
 
 
-# ----------------------------------------------------------------------------------------------------
-# How the evidence weighs every record: average cycles or samples, the noise in each, and what is no evidence.
+# --- Weights of a record
 
 
 RESOLUTION = 3e-4
-"""No force is believed to be known better than this share of the record's peak (r.m.s.).
+"""Resolution of the force as a share of the record's peak (r.m.s.): a floor of the noise.
 
-Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide
-alone. Not tuned."""
-INSTANT = 1e-6
-"""Delay by which the slope of a force over time is taken [s].
+Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide alone. Not tuned.
+"""
+DELAY_STEP = 1e-6
+"""Delay by which the slope of a force over time is differenced [s].
 
 Reason: far below a sample, far above the rounding of a time stamp."""
-LATEST = 3.0
-"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
+LARGEST_DELAY = 3.0
+"""Standard deviations of a test's delay to which the part of the shift beyond its slope is limited.
 
 Reason: the customary bound for what a normal prior still allows."""
 DISCREPANCY = 0.3
-"""Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
-fitted: a model that still lacks something must not be bent to where the noise happens to be smallest.
+"""Share of what a model leaves (r.m.s.) that counts as noise of every harmonic alike while the model is being fitted: a
+model that still lacks something must not be bent to where the noise happens to be smallest.
 
 Reason: 0 believes the quietest harmonics whatever the model lacks, 1 leaves no evidence; about a tenth of the squares.
 Not tuned."""
 MOST_HARMONICS = 80
-"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart.
+"""Highest harmonic of the cycle that is compared.
 
-Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of
-the first, and `RESOLUTION` is no finer."""
-UNWEIGHTED = 0.05
-"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
+Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of the
+first, and `RESOLUTION` is no finer."""
+EQUAL_WEIGHT_DEVIATION = 0.05
+"""Residual of the element without effects [share of the peak, r.m.s.], by which criterion (4) is set against the wide
+priors of C and k.
 
-Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test
-shows. Not tuned."""
+Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test shows. Not
+tuned."""
 CYCLE_POINTS = 256
-"""A cycle is simulated on at least this many points.
+"""Least number of points on which a cycle is simulated.
 
 Reason: three points for each of the harmonics that are compared."""
 FEWEST_SAMPLES = 2 * CYCLE_POINTS
-"""Fewer samples of a motion that does not repeat do not show what colour their noise has."""
+"""Fewest samples of a motion that does not repeat.
+
+Reason: fewer do not show the spectrum of their noise."""
 MOST_POINTS = 2048
-"""And on no more: the harmonics that are compared need no finer grid, however slow the test.
+"""Largest number of points of a cycle: the compared harmonics need no finer grid, however slow the test.
 
 Reason: 25 points for each of the harmonics that are compared."""
 
 
-def record_likelihood(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
-    """The observation of some samples of a record; None where they are too few.
+def weighted_record(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord | None:
+    """Weigh some samples of a record; None where they are too few.
 
     Parameters
     ----------
     p : the record
-    mask : (n,) which of its samples count
-    place : its base row; -1 where the voltage moves
-    given : what the damper makes of it, along which gain and delay act
+    mask : (n,) samples to be compared
+    base_row : its base row; -1 where the voltage moves
+    given : predicted force, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
-    if not enough(p, mask):
+    if not enough_samples(p, mask):
         return None
-    return (_of_cycles if _averaged(p) else _of_samples)(p, mask, place, given, nuisance)
+    return (_from_cycles if _is_averaged(p) else _from_samples)(p, mask, base_row, given, nuisance)
 
 
-def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
+def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
     """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
 
     Parameters
     ----------
     p : the record
-    mask : (n,) which of its samples count
+    mask : (n,) samples to be compared
     """
-    if p.cycles is not None and _averaged(p):
+    if p.cycles is not None and _is_averaged(p):
         return bool(p.cycles.whole(p.record.time, mask))
     return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
 
 
-def _averaged(p: Prepared) -> bool:
+def _is_averaged(p: PreparedRecord) -> bool:
     """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
-    return p.cycles is not None and not warms(p.record.temperature)
+    return p.cycles is not None and not temperature_moves(p.record.temperature)
 
 
-def _of_cycles(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
+def _from_cycles(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord | None:
     run = p.cycles
     if run is None:
         return None
@@ -313,14 +321,14 @@ def _of_cycles(
     cycle = _resampled(whole[counted].mean(axis=0), points)
     peak = float(np.max(np.abs(cycle)))
     average = _resampled(simulated.mean(axis=0), points)
-    left = DISCREPANCY * _left_by(cycle, average, np.gradient(average), error.sample_variance / len(counted))
+    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), error.sample_variance / len(counted))
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     motion, lead, factor = _cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion])
-    bare = RecordLikelihood(
+    bare = WeightedRecord(
         record.name,
-        place,
+        base_row,
         motion,
         float(cycle[-(lead // factor) % cycle.size]),
         lead + factor * np.arange(cycle.size),
@@ -329,13 +337,13 @@ def _of_cycles(
         peak,
         error,
         weights,
-        IntegratedOut.nothing(2 * weights.size - 1),
+        MarginalisedNuisances.none(2 * weights.size - 1),
     )
     return with_nuisances(bare, given.damper, nuisance)
 
 
-def _left_by(measured: Array, force: Array, slope: Array, variance: float) -> float:
-    """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
+def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
+    """Compute the r.m.s. residual of a model above the noise [N], offset, gain and delay of the test fitted."""
     columns = np.column_stack([np.ones(force.size), force, slope])
     residual = measured - force
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
@@ -343,7 +351,7 @@ def _left_by(measured: Array, force: Array, slope: Array, variance: float) -> fl
 
 
 def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
-    """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
+    """Return a cycle of the mean motion, with half a cycle in front to settle, on a grid fine enough to simulate."""
     points = channels[0].size
     factor = int(np.ceil(CYCLE_POINTS / points))
     fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
@@ -365,15 +373,15 @@ def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> t
 
 
 def _resampled(cycle: Array, points: int) -> Array:
-    """A periodic channel on more points or fewer, by its own harmonics."""
+    """Resample a periodic channel to another number of points by its harmonics."""
     if points == cycle.size:
         return cycle
     return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
 
 
-def _of_samples(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood:
+def _from_samples(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
     first, *_, last = np.flatnonzero(mask)
@@ -382,20 +390,20 @@ def _of_samples(
     measured = record.force[mask]
     noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
     peak = float(np.max(np.abs(measured)))
-    alike = _samples_alike(record)
+    alike = _samples_per_harmonic(record)
     left = (
         alike
-        * (DISCREPANCY * _left_by(measured, force[mask], gradient_within_stretches(force[mask], mask), noise.variance))
+        * (DISCREPANCY * _model_discrepancy(measured, force[mask], slope_within(force[mask], mask), noise.variance))
         ** 2
     )
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
-    motion, places = motion_of(record)
-    rows = int(np.count_nonzero(has_predecessors(compared, noise.coefficients.size)))
-    bare = RecordLikelihood(
+    motion, places = simulation_motion(record)
+    rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
+    bare = WeightedRecord(
         record.name,
-        place,
+        base_row,
         motion,
         float(record.force[0]),
         places[start:stop],
@@ -404,13 +412,13 @@ def _of_samples(
         peak,
         noise,
         np.zeros(0),
-        IntegratedOut.nothing(rows),
+        MarginalisedNuisances.none(rows),
     )
     return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
 
-def _samples_alike(record: Record) -> float:
-    """Samples that say the same of what a model leaves: it fills as many harmonics of the motion as a cycle shows.
+def _samples_per_harmonic(record: Record) -> float:
+    """Compute how many samples carry the same model error: it fills as many harmonics of the motion as a cycle shows.
 
     So what counts as noise has the same density at every sampling rate.
     """
@@ -419,36 +427,38 @@ def _samples_alike(record: Record) -> float:
 
 
 def with_nuisances(
-    bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
-) -> RecordLikelihood:
-    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
+    bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
+) -> WeightedRecord:
+    """Integrate out the test's own offset, gain and delay, jumps and instants of the voltage.
+
+    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
 
     Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
 
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
     """
-    shown = responses(bare, damper)
+    shown = delayed_forces(bare, damper)
     force, averaged = shown(0.0), isinstance(bare.noise, PureError)
-    late = (shown(INSTANT) - force) / INSTANT
+    late = (shown(DELAY_STEP) - force) / DELAY_STEP
     columns = np.column_stack(
         [
             nuisance.delay_s * late,
             np.full(force.size, nuisance.offset * bare.peak),
             nuisance.gain * force,
-            _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+            _jump_columns(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
             *([] if timing is None else [timing]),
         ]
     )
-    nuisances = IntegratedOut.of(bare.in_noise(columns))
-    likeliest = float(nuisances.likeliest(bare.in_noise(bare.measured - force))[0])
-    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    nuisances = MarginalisedNuisances.from_columns(bare.standardised(columns))
+    likeliest = float(nuisances.most_likely(bare.standardised(bare.measured - force))[0])
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LARGEST_DELAY, LARGEST_DELAY))
     measured = bare.measured - (shown(delay) - force - delay * late)
     return replace(bare, measured=measured, nuisances=nuisances)
 
 
-def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
-    """The observation as criterion (4) takes it: every sample alike, and nothing left to the test's own nuisances.
+def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> WeightedRecord:
+    """Weigh an observation as criterion (4) does: every sample alike, and no nuisances.
 
     Equation: |r|^2 = n mean (F - F_sim)^2 / s^2, s alike in all tests of one condition
                                                     Source: Makowski and Knap 2021, eq. (4); Parseval
@@ -459,17 +469,17 @@ def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLi
     samples : that it counts for
     peak : largest force of its condition [N]
     """
-    scale = UNWEIGHTED * peak
+    scale = EQUAL_WEIGHT_DEVIATION * peak
     if isinstance(weighed.noise, Autoregression):
         white = Autoregression(np.zeros(0), scale**2)
-        return replace(weighed, noise=white, nuisances=IntegratedOut.nothing(weighed.measured.size))
+        return replace(weighed, noise=white, nuisances=MarginalisedNuisances.none(weighed.measured.size))
     weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
     weights[0] /= np.sqrt(2.0)
-    return replace(weighed, weights=weights, nuisances=IntegratedOut.nothing(2 * weights.size - 1))
+    return replace(weighed, weights=weights, nuisances=MarginalisedNuisances.none(2 * weights.size - 1))
 
 
-def _neighbours_of(bends: Array) -> Array:
-    """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
+def _jump_columns(bends: Array) -> Array:
+    """Return (n, j) one column per sample beside a jump, as large as the force bends there [N]."""
     beside = np.flatnonzero(bends)
     columns = np.zeros((bends.size, beside.size))
     columns[beside, np.arange(beside.size)] = bends[beside]

@@ -1,4 +1,4 @@
-"""What a damper predicts for a record."""
+"""Force that a damper predicts for a record, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,59 +10,56 @@ from numpy.typing import NDArray
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
-from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
 from pzd.signals.measures import reversals
 from pzd.signals.noise import harmonics_of
 
-# ----------------------------------------------------------------------------------------------------
-
-
 FEWEST_IN_HALF_CYCLE = 25
-"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
+"""Fewest samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
 PREDICTION_TOLERANCE = 1e-7
-"""Of the damper's path, as a share of the force.
+"""Tolerance of the path of the element, as a share of the force.
 
-Reason: far below `weights.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
+Reason: far below `likelihood.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
 
-WARMS = 0.5
-"""A test over which the temperature moves by less [K] counts as its average cycle, at one temperature.
+MOVING_TEMPERATURE = 0.5
+"""Change of temperature over a test [K] up to which it counts as its average cycle, at one temperature.
 
 Reason: about the resolution of a thermocouple; not tuned."""
-HELD = 0.05
-"""A temperature that moves by less [K] over a test stands still there.
+FIXED_TEMPERATURE = 0.05
+"""Change of temperature over a test [K] up to which it is simulated at its median.
 
 Reason: of 5 % a kelvin, which is much for an oil, the force changes by 0.25 % of itself, which counts as nothing."""
-BESIDE_STEP = 0.001
-"""Nothing is judged so shortly before and after a step of the voltage [s].
+NEAR_STEP = 0.001
+"""Time before and after a step of the voltage that is not compared [s].
 
 Reason: two standard deviations of a test's own delay (`NuisanceConfig.delay_s`); a sample at least, over which a filter
 against aliasing spreads the step of the force."""
-ENDS = 0.02
-"""Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
+END_SHARE = 0.02
+"""Share of a record at either end that is not compared: the smoothed displacement rests on one side alone there."""
 
 
-def predicted_force(damper: Damper, prepared: Prepared) -> Array:
-    """(n,) force that the damper gives under the record's cleaned motion [N]."""
+def predicted_force(damper: Damper, prepared: PreparedRecord) -> Array:
+    """Predict the (n,) force of a damper under the record's cleaned motion [N]."""
     record = prepared.lead or prepared.record
-    return force_in(damper, record)[prepared.lead_samples :]
+    return simulated_record(damper, record)[prepared.lead_samples :]
 
 
-def force_in(damper: Damper, record: Record) -> Array:
-    """(n,) force that the damper gives in the motion of a record, from the recorded force on [N]."""
-    motion, places = motion_of(record)
+def simulated_record(damper: Damper, record: Record) -> Array:
+    """Simulate the (n,) force of a damper in the motion of a record, from its first recorded force on [N]."""
+    motion, places = simulation_motion(record)
     return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[places]
 
 
-def motion_of(record: Record) -> tuple[Motion, Rows]:
-    """The record's motion, on a finer grid where its samples are too far apart.
+def simulation_motion(record: Record) -> tuple[Motion, Rows]:
+    """Return the record's motion, on a finer grid where its samples are too far apart.
 
     That is where no parabola goes from one to the next, and where the voltage steps between two.
 
     Parameters
     ----------
-    record : cleaned; a temperature that hardly moves counts as standing still, at its median
+    record : cleaned; a temperature that hardly moves is replaced by its median
 
     Returns
     -------
@@ -72,56 +69,56 @@ def motion_of(record: Record) -> tuple[Motion, Rows]:
     half_cycle = min(np.diff(reversals(record.displacement)), default=size)
     fewest = int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1)))
     motion, places = Motion.of(record).finer(np.maximum(parts_of_steps(record.voltage, size), fewest))
-    if motion.temperature is not None and not warms(motion.temperature, HELD):
+    if motion.temperature is not None and not temperature_moves(motion.temperature, FIXED_TEMPERATURE):
         held = np.full(motion.temperature.size, np.median(motion.temperature))
         motion = replace(motion, temperature=held)
     return motion, places
 
 
-def warms(temperature: Array | None, by: float = WARMS) -> bool:
-    """Whether a temperature (n,) moves by so much [K] from beginning to end; False where none was recorded."""
-    return temperature is not None and float(np.ptp(ends(temperature))) > by
+def temperature_moves(temperature: Array | None, by: float = MOVING_TEMPERATURE) -> bool:
+    """Whether a temperature (n,) changes by so much [K] from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(end_temperatures(temperature))) > by
 
 
-def ends(temperature: Array) -> tuple[float, float]:
-    """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
+def end_temperatures(temperature: Array) -> tuple[float, float]:
+    """Return the temperature [degC] at the beginning and at the end of a test, with noise averaged out."""
     tenth = max(temperature.size // 10, 1)
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
-def counted(prepared: Prepared) -> NDArray[np.bool_]:
-    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped.
+def comparable_samples(prepared: PreparedRecord) -> NDArray[np.bool_]:
+    """Return (n,) whether a prediction can be compared with a sample.
 
-    And whether something moves, or has just come to rest.
+    It depends neither on how the record began nor on when exactly a voltage stepped; and something moves, or has just
+    come to rest.
     """
     size = prepared.record.time.size
     if prepared.lead is not None:
         return np.ones(size, dtype=np.bool_)
-    ends = int(ENDS * size)
+    ends = int(END_SHARE * size)
     order = np.arange(size)
     inside = (order >= ends) & (order < size - ends)
     return inside & in_motion(prepared.record) & ~_stepping(prepared.record)
 
 
 def _stepping(record: Record) -> NDArray[np.bool_]:
-    """(n,) whether the voltage steps shortly before or after a sample."""
+    """Return (n,) whether the voltage steps shortly before or after a sample."""
     size = record.time.size
     steps = np.append(steps_of_voltage(record.voltage, size), False)
     if not steps.any():
         return steps
-    reach = int(np.ceil(BESIDE_STEP * record.rate))
-    near = np.convolve(steps, np.ones(2 * reach + 2))[reach : reach + size]
+    width = int(np.ceil(NEAR_STEP * record.rate))
+    near = np.convolve(steps, np.ones(2 * width + 2))[width : width + size]
     beside: NDArray[np.bool_] = near > 0.5
     return beside
 
 
-# ----------------------------------------------------------------------------------------------------
-# What a damper makes of a record, and how uncertain that is because the channels are: errors in variables.
+# --- Predicted force with its uncertainty
 #
-# What noise and resolution leave in the cleaned displacement of an average cycle repeats in every
-# cycle of the prediction, and the oil spring makes force of it; the scatter of the force between
-# cycles does not show it. So a few displacements that are as likely are sent through the damper.
-# A voltage that moves is known at its samples alone: a step falls anywhere between two of them.
+# Errors in variables: what noise and resolution leave in the cleaned displacement of an average cycle repeats in every
+# cycle of the prediction, and the oil stiffness turns it into force; the scatter of the force between cycles does not
+# show it. So a few displacements that are as likely are simulated (Monte Carlo). A voltage that moves is known at its
+# samples alone: a step falls anywhere between two of them.
 
 
 BETWEEN_SAMPLES = 0.5
@@ -131,20 +128,20 @@ NEIGHBOURS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Predicted:
-    """The force that a damper gives in a record, and how uncertain it is."""
+class PredictedForce:
+    """Force that a damper predicts for a record, and its uncertainty."""
 
     damper: Damper
     force: Array
-    """(n,) that it gives [N]."""
+    """(n,) [N]."""
     displacement_variance: Array | float
     """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
     timing: Array
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
 
 
-def expected(damper: Damper, prepared: Prepared, delay: float) -> Predicted:
-    """What a damper makes of a record.
+def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> PredictedForce:
+    """Predict the force of a damper in a record, with its uncertainty.
 
     Parameters
     ----------
@@ -153,10 +150,12 @@ def expected(damper: Damper, prepared: Prepared, delay: float) -> Predicted:
     delay : standard deviation of a test's own delay [s]
     """
     force = predicted_force(damper, prepared)
-    return Predicted(damper, force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
+    return PredictedForce(
+        damper, force, displacement_variance(damper, prepared), _timing(damper, prepared, force, delay)
+    )
 
 
-def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:
+def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float) -> Array:
     record = prepared.record
     if prepared.constant or record.voltage is None:
         return np.zeros((force.size, 0))
@@ -165,8 +164,8 @@ def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> A
     return np.asarray(np.hypot(BETWEEN_SAMPLES, delay * record.rate) * change[:, None])
 
 
-def force_error(damper: Damper, prepared: Prepared) -> Array | float:
-    """Variance of the harmonics of a predicted average cycle, because its displacement is not known better.
+def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | float:
+    """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
 
     Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
 
@@ -182,7 +181,7 @@ def force_error(damper: Damper, prepared: Prepared) -> Array | float:
     if not prepared.draws:
         return 0.0
     points = prepared.draws[0].time.size // 2
-    known, *others = (force_in(damper, draw)[points:] for draw in prepared.draws)
+    known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
     changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
     power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     power[0] = 0.0  # a stuck damper keeps whatever offset it began with

@@ -1,9 +1,9 @@
-"""The shapes that a residual is held against: what each is made of, the unit of its coefficient, and its physics.
+"""Shapes for the regression of a residual: the expression of each, the unit of its coefficient, and its physics.
 
-One entry a shape; adding one means adding an entry, and `law` where an effect file can hold it. Expressions are in the
-symbols of the paper: x counts from the middle of the stroke, v and a are the rod's, F the force that the damper handed
-on gives, U the control signal, T the temperature, t the time since the test began. The method is the force surface of
-Masri and Caughey 1979, J. Appl. Mech. 46, with the sparse choice of terms of Brunton, Proctor and Kutz 2016, PNAS 113.
+One entry per shape; adding one means adding an entry, and `law` where an effect file can hold it. Expressions are in
+the symbols of the paper: x from the middle of the stroke, v and a of the rod, F the predicted force, U the control
+signal, T the temperature, t the time since the test began. The method is the force surface of Masri and Caughey 1979,
+J. Appl. Mech. 46, with the sparse choice of terms of Brunton, Proctor and Kutz 2016, PNAS 113.
 """
 
 from __future__ import annotations
@@ -14,33 +14,34 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.data import PreparedRecord
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 
-# ----------------------------------------------------------------------------------------------------
-# What shapes are made of: the signals along a test, and those columns that take more than one expression.
+# --- Signals along a test, and columns that take more than one expression
 
 
 LENGTHS = tuple(float(x) for x in np.geomspace(0.2, 1.5, 42))
-"""Wave lengths that are tried [half strokes]: 5 % apart, so that the shortest stays within a quarter of a wave over the
-stroke; a longer one is a spring."""
+"""Wave lengths that are tried [half strokes].
+
+Reason: 5 % apart, so that the shortest stays within a quarter of a wave over the stroke; a longer one is a spring."""
 PLACES = tuple(float(x) for x in np.linspace(-0.9, 0.9, 37))
-"""Places of the stroke that are tried [half strokes from its middle]: a sixth of `SPOT` apart."""
+"""Positions that are tried [half strokes from the middle]: a sixth of `SPOT` apart."""
 SPOT = 0.3
-"""Half-width of a place with friction of its own [half strokes]; a narrower one shows as well, and no ride would feel
-it."""
+"""Half width of a position with friction of its own [half strokes].
+
+Reason: a narrower one shows as well, and makes no difference to a ride."""
 WIDTHS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
-"""Half-widths of the play that are tried [half strokes]."""
+"""Half widths of the play that are tried [half strokes]."""
 TIMES_S = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Time constants of the lag that are tried [s], in half decades."""
 SHORTEST_RISE = 0.5
-"""Time constants of what changes while a test runs [s], and the doubles of it up to `LONGEST_RISE`."""
+"""Shortest time constant of damping that changes while a test runs [s]; doubled up to `LONGEST_RISE`."""
 LONGEST_RISE = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """What a shape may be made of, along one test."""
+    """Signals along one test, of which shapes are made."""
 
     t: Array
     """(n,) time since the test began [s]."""
@@ -62,11 +63,12 @@ class Signals:
 
 
 Columns = Callable[[Signals], Iterator[tuple[float | None, Array]]]
-"""Value of the parameter that is searched (None without one), and (n, k) columns: one a coefficient."""
+"""Function that yields the value of the searched parameter (None without one) and (n, k) columns, one per coefficient.
+"""
 
 
 def one_column(function: Callable[[Signals], Array]) -> Columns:
-    """The one column that a function of the signals gives; nothing is searched."""
+    """Return the columns of a shape without a searched parameter."""
 
     def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
         yield None, np.asarray(function(s))[:, None]
@@ -75,28 +77,33 @@ def one_column(function: Callable[[Signals], Array]) -> Columns:
 
 
 def waves(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Sine and cosine of each wave length [m] over the position."""
+    """Yield sine and cosine over the position for each wave length [m]."""
     for length in (share * s.half_stroke for share in LENGTHS):
         phase = 2.0 * np.pi * s.x / length
         yield length, np.column_stack([np.sin(phase), np.cos(phase)])
 
 
 def at_a_place(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Friction of about one around each place [m], falling to nothing in a straight line to either side."""
+    """Yield a triangle of friction around each position [m], of height one."""
     for place in (share * s.half_stroke for share in PLACES):
         yield place, (np.sign(s.v) * np.maximum(1.0 - np.abs(s.x - place) / (SPOT * s.half_stroke), 0.0))[:, None]
 
 
 def behind_play(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Pull of what the rod drags behind a play of each half-width [m], one at most."""
+    """Yield the force through a play of each half width [m], at most one."""
     for half_width in (share * s.half_stroke for share in WIDTHS):
         yield half_width, (play(s.x, half_width) / half_width)[:, None]
 
 
 def play(x: Array, half_width: float) -> Array:
-    """(n,) by how far the rod is ahead of what it drags behind a play of that half-width [m].
+    """Compute (n,) by how far the rod is ahead of what it drags behind a play of that half width [m].
 
     Equation: e_i = clip(e_(i-1) + x_i - x_(i-1), -r, r)     Source: Visintin 1994, Differential Models of Hysteresis
+
+    Examples
+    --------
+    >>> play(np.array([0.0, 1.0, 2.0, 1.5]), 1.0).tolist()
+    [0.0, 1.0, 1.0, 0.5]
     """
     ahead, found = 0.0, np.empty(x.size)
     for i, step in enumerate(np.diff(x, prepend=x[0]).tolist()):
@@ -106,7 +113,7 @@ def play(x: Array, half_width: float) -> Array:
 
 
 def lagging(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Velocity behind a lag of first order, less the velocity itself: what the lag takes off the damping."""
+    """Yield the velocity after a first-order lag less the velocity itself: what the lag takes off the damping."""
     from scipy.signal import lfilter
 
     step = float(np.median(np.diff(s.t)))
@@ -117,26 +124,26 @@ def lagging(s: Signals) -> Iterator[tuple[float | None, Array]]:
 
 
 def while_running(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Velocity by a share that grows from 0 towards 1 while a test runs, with each time constant [s]."""
+    """Yield the velocity times a share that grows from 0 towards 1 while a test runs, for each time constant [s]."""
     tau = SHORTEST_RISE
     while tau <= LONGEST_RISE:
         yield tau, (-np.expm1(-s.t / tau) * s.v)[:, None]
         tau *= 2.0
 
 
-def signals_of(prepared: Prepared, force: Array, temperature: float | None, half_stroke: float) -> Signals:
-    """What a shape may be made of, along one test.
+def signals_of(prepared: PreparedRecord, force: Array, temperature: float | None, half_stroke: float) -> Signals:
+    """Return the signals along one test.
 
     Parameters
     ----------
     prepared : the test, its displacement cleaned and counted from the middle of the stroke
-    force : (n,) that the damper gives [N]
+    force : (n,) predicted force [N]
     temperature : median of all tests [degC]; None where none was recorded
     half_stroke : of all tests [m]
     """
     record = prepared.record
-    warmth = record.median_temperature()
-    T = 0.0 if warmth is None or temperature is None else warmth - temperature
+    own = record.median_temperature()
+    T = 0.0 if own is None or temperature is None else own - temperature
     U = np.zeros(force.size) if record.voltage is None else record.voltage
     if prepared.constant and record.voltage is not None:
         U = np.full(force.size, record.median_voltage())
@@ -152,7 +159,7 @@ def signals_of(prepared: Prepared, force: Array, temperature: float | None, half
     )
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- The table of shapes
 
 
 Needs = Literal["control", "temperature"]
@@ -160,28 +167,28 @@ Needs = Literal["control", "temperature"]
 
 @dataclass(frozen=True)
 class Shape:
-    """One shape."""
+    """One shape of a residual."""
 
     name: str
     """The expression behind the coefficient."""
     unit: str
-    """Of the coefficient."""
+    """Unit of the coefficient."""
     physics: str
-    """What has this shape."""
+    """Physics that has this shape."""
     source: str
     columns: Columns
     parameter: str | None = None
-    """Symbol of what is searched beside the coefficient."""
+    """Symbol of the parameter that is searched beside the coefficient."""
     parameter_unit: str = ""
     needs: Needs | None = None
     """What must differ in the tests."""
     law: str | None = None
-    """The same as Python of x, v and a, with `math` alone, where a force beside the element can have it; of two
-    coefficients the second law stands behind a semicolon."""
+    """The shape as Python of x, v and a, with `math` alone, where a parallel force can have it; of two coefficients the
+    second law stands behind a semicolon."""
     per_control: bool = False
-    """Whether it is one that goes with the control signal, made of another."""
+    """Whether it is another shape in proportion to the control signal."""
     width: float | None = None
-    """Half-width of the place that it is about [half strokes]; the force falls to nothing there in a straight line."""
+    """Half width of its position [half strokes]."""
     library: tuple[str, ...] = ()
     """Effects of the library that have this shape."""
 
@@ -279,7 +286,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("T sign v", "N/K", "friction that changes with the temperature", _DIXON, lambda s: s.T * np.sign(s.v),
            needs="temperature", library=("temperature_drift",)),
 )  # fmt: skip
-"""Every shape; those of x, v and a with one coefficient come a second time, in proportion to the control signal."""
+"""All shapes; those of x, v and a with one coefficient are tried a second time in proportion to the control signal."""
 
 IN_ONE_UNIT = {
     "N": "-", "-": "N", "N/m": "m", "N/m2": "m2", "N/m3": "m3", "N s/m": "m/s", "N s/m2": "m2/s", "N s/m3": "m3/s",
@@ -290,7 +297,7 @@ IN_ONE_UNIT = {
 
 
 def shapes_of(signals: Sequence[Signals]) -> tuple[Shape, ...]:
-    """The shapes that the tests can show.
+    """Return the shapes that the tests can show.
 
     Parameters
     ----------
@@ -303,13 +310,13 @@ def shapes_of(signals: Sequence[Signals]) -> tuple[Shape, ...]:
         "control": moves or float(np.ptp(U)) > CONSTANT_SHARE * float(np.max(np.abs(U))),
         "temperature": float(np.ptp(T)) > SAME_TEMPERATURE,
     }
-    plain = [shape for shape in SHAPES if shape.needs is None or several[shape.needs]]
-    by_control = [_by_control(shape) for shape in plain if shape.law and shape.parameter is None]
-    return (*plain, *(by_control if several["control"] else ()))
+    usable = [shape for shape in SHAPES if shape.needs is None or several[shape.needs]]
+    by_control = [_by_control(shape) for shape in usable if shape.law and shape.parameter is None]
+    return (*usable, *(by_control if several["control"] else ()))
 
 
 def _by_control(shape: Shape) -> Shape:
-    """The shape in proportion to the control signal."""
+    """Return a shape in proportion to the control signal."""
 
     def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
         yield from ((value, s.U[:, None] * found) for value, found in shape.columns(s))

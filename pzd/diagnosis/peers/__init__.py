@@ -1,4 +1,9 @@
-"""Published models that a damper is compared with, one file each; every module here is found by itself."""
+"""Published models that a damper is compared with, one file each; every module here is found by itself.
+
+A peer gives the force of one test at one value of the control signal as F = sum_j a_j phi_j: the coefficients a_j enter
+linearly and are solved for, the columns phi_j depend on the motion and on a few shape parameters, which are searched.
+The file of a peer declares `PEER`.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +15,8 @@ from functools import cache
 
 import numpy as np
 
-from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.data import PreparedRecord
 from pzd.record import Array
-
-# ----------------------------------------------------------------------------------------------------
-# What a published model must define so that a damper can be compared with it; its file in `peers/` declares `PEER`.
-#
-# A peer gives the force of one test at one value of the control signal as F = sum_j a_j phi_j: the coefficients a_j enter
-# linearly and are solved for, the columns phi_j depend on the motion and on a few shape parameters, which are searched.
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +28,13 @@ class StrokeMotion:
     velocity: Array
     """[m/s]"""
     step: float
-    """From sample to sample [s]."""
+    """Sampling interval [s]."""
     settling: int = 0
-    """Samples at the beginning that are there for a state to settle, and are not asked for."""
+    """Samples in front, for a state to settle."""
 
     @classmethod
-    def of(cls, prepared: Prepared) -> StrokeMotion:
-        """The cleaned motion of a record, led in as that of the damper is."""
+    def of(cls, prepared: PreparedRecord) -> StrokeMotion:
+        """Return the cleaned motion of a record, with its lead."""
         record = prepared.lead or prepared.record
         x = record.displacement
         middle = 0.5 * float(np.min(x) + np.max(x))
@@ -52,7 +51,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class ShapeParameter:
-    """A parameter that is searched, and its limits."""
+    """A parameter that is searched, with its limits."""
 
     name: str
     unit: str
@@ -67,9 +66,9 @@ class PeerForm:
     """One form of a peer; of several the one is taken that fits all voltages best."""
 
     label: str
-    """What sets it apart from the others, such as `n = 2`; empty where there is one."""
+    """What distinguishes it from the others, such as `n = 2`; empty where there is one."""
     columns: Callable[[StrokeMotion, Array], Array]
-    """(n, coefficients) what each coefficient multiplies, without the settling, by the (s,) shape parameters."""
+    """Function of motion and (s,) shape parameters, to the (n, coefficients) columns without the settling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ class Peer:
     """A published model of a controlled damper at one value of its control signal."""
 
     name: str
-    """As tables call it, and its file."""
+    """Name in tables, and of its file."""
     law: str
     source: str
     coefficients: tuple[Coefficient, ...]
@@ -88,21 +87,18 @@ class Peer:
 
     @property
     def parameters(self) -> tuple[Coefficient | ShapeParameter, ...]:
-        """All of them: the coefficients, then the shape."""
+        """Coefficients, then shape parameters."""
         return (*self.coefficients, *self.shape)
 
     def force(self, form: PeerForm, motion: StrokeMotion, parameters: Array) -> Array:
-        """(n,) force of one form along a motion [N], by (p,) values in the order of `parameters`."""
+        """Compute the (n,) force of one form along a motion [N], with (p,) values in the order of `parameters`."""
         count = len(self.coefficients)
         force: Array = form.columns(motion, parameters[count:]) @ parameters[:count]
         return force
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
 @cache
 def peers() -> dict[str, Peer]:
-    """Every peer by name."""
+    """Return every peer by name."""
     found = [importlib.import_module(f"{__name__}.{info.name}").PEER for info in pkgutil.iter_modules(__path__)]
     return {peer.name: peer for peer in sorted(found, key=lambda peer: peer.name)}

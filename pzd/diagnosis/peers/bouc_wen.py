@@ -28,7 +28,7 @@ _hysteresis_after = compiled_law(hysteresis_after)
 
 
 def columns(exponent: int, motion: StrokeMotion, shape: Array) -> Array:
-    """(n, 4) what c, k, alpha and f0 multiply, by n, rho [1/m] and sigma [-]."""
+    """Return the (n, 4) columns of c, k, alpha and f0, by n, rho [1/m] and sigma [-]."""
     z = np.zeros(motion.displacement.size)
     rho, sigma = (float(value) for value in shape)
     _fill(motion.displacement, motion.velocity, motion.step, rho, sigma, exponent, z)
@@ -38,14 +38,14 @@ def columns(exponent: int, motion: StrokeMotion, shape: Array) -> Array:
 
 
 def grid(motions: Sequence[StrokeMotion]) -> Array:
-    """(g, 2) rho [1/m] and sigma [-] from which the search begins."""
+    """Return (g, 2) starting values of rho [1/m] and sigma [-]."""
     widest = max(float(np.max(np.abs(motion.displacement))) for motion in motions)
     return np.array([(steep / widest, sigma) for steep in STEEPNESS for sigma in UNLOADING])
 
 
 @compiled
 def _fill(x: Array, v: Array, step: float, rho: float, sigma: float, exponent: int, z: Array) -> None:
-    """Fill z (n,) from 0 on; the extension is a parabola inside each step, cut where the rod turns round."""
+    """Integrate z (n,) from 0; the extension is a parabola inside each step, divided where the rod turns round."""
     now = 0.0
     for i in range(1, x.size):
         travel, half = x[i] - x[i - 1], 0.5 * (v[i] - v[i - 1])

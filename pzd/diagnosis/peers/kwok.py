@@ -21,14 +21,14 @@ LOOPS = np.linspace(-3.0, 3.0, 9)
 
 
 def columns(motion: StrokeMotion, shape: Array) -> Array:
-    """(n, 4) what c, k, alpha and f0 multiply, by beta [s/m] and delta [-]."""
+    """Return the (n, 4) columns of c, k, alpha and f0, by beta [s/m] and delta [-]."""
     x, v = motion.displacement[motion.settling :], motion.velocity[motion.settling :]
     beta, delta = shape
     return np.column_stack([v, x, np.tanh(beta * v + delta * np.sign(x)), np.ones(v.size)])
 
 
 def grid(motions: Sequence[StrokeMotion]) -> Array:
-    """(g, 2) beta [s/m] and delta [-] from which the search begins."""
+    """Return (g, 2) starting values of beta [s/m] and delta [-]."""
     fastest = max(float(np.max(np.abs(motion.velocity))) for motion in motions)
     return np.array([(slope / fastest, loop) for slope in SLOPES for loop in LOOPS])
 

@@ -1,4 +1,4 @@
-"""Every effect that can be named fitted to the data, one at a time, together with those already adopted."""
+"""Candidates: every effect that can be named, fitted one at a time together with those already adopted."""
 
 from __future__ import annotations
 
@@ -12,33 +12,32 @@ import numpy as np
 from pzd.damper.confounders import confounders, known
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library, nameable
-from pzd.diagnosis.fit.forces import left_at
-from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, Fitted, fit, not_taken_up
-from pzd.diagnosis.fit.parameters import BOUND, Problem, Unknown
-from pzd.diagnosis.fit.prediction import WARMS, ends
+from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, projected_out
+from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
+from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
+from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.thresholds import (
-    AT_EDGE,
-    FAINT,
-    FAINTER_STARTS,
     FIRST_EVALUATIONS,
-    LEAST_PROMISE,
+    LEAST_DROP_IN_GAP,
+    LEAST_DROP_IN_NOISE,
+    LINEARISED_SHARE,
     MOST_EVALUATIONS_OF_BEST,
     MOVING_VOLTAGE,
     NEARLY_AS_GOOD,
-    SLIGHT_PROMISE,
+    SEARCH_LIMIT_MARGIN,
+    SHARE_WORTH_FITTING,
+    SHARE_WORTH_SEARCHING,
+    SMALLER_STARTS,
     STARTS_TRIED,
-    WORSE_THAN_CONTAINED,
-    WORTH_FITTING,
-    WORTH_SEARCHING,
+    STUCK_MISFIT,
 )
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# Where the search for an effect starts: its starting values, and what a linearised step promises from each.
+# --- Starting values, and the drop in misfit that a linearised step promises from each
 
 
-def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
-    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
+def sorted_starts(problem: Problem, before: FitResult, effect: Effect) -> list[Array]:
+    """Return all starting values of an effect, sorted by the misfit that one linearised step promises from each.
 
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
@@ -50,65 +49,61 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
     return [starts[i] for i in np.argsort(promised, kind="stable")]
 
 
-def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
-    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect], count: int) -> list[Effect]:
+    """Return the effects from whose starting values one linearised step promises the smallest misfits, best first."""
     promised = []
     for effect in effects:
-        own = problem.growing(effect)
+        own = problem.with_friction_scaling(effect)
         starts = starts_of(own, before, effect)
         promised.append(min(_promised_misfit(own, before, effect, start) for start in starts))
     return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
 
 
-def promise(problem: Problem, before: Fitted, effect: Effect) -> float:
-    """By how much a linearised step lowers the misfit at most, from an effect's starting values or from near none."""
+def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
+    """Compute the largest drop in misfit that a linearised step promises, from the starts or from near zero."""
     starts = starts_of(problem, before, effect)
-    faint = (*starts, *(fainter(problem, before, effect, start, FAINT) for start in starts))
+    faint = (*starts, *(towards_neutral(problem, before, effect, start, LINEARISED_SHARE) for start in starts))
     return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
 
 
-def starts_of(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
-    """All combinations of the starting values of an effect, each (unknowns,) in the units of the search.
+def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array]:
+    """Return all combinations of the starting values of an effect, each (unknowns,) in the units of the search.
 
-    What is looked for by voltage starts at every one of them alike, or in proportion to T0.
+    A parameter with one value per voltage starts alike at all of them, or in proportion to T0.
     """
-    unknowns = _new(problem, before, effect)
-    own = {u.parameter.name: u.parameter for u in unknowns}
-    grid = itertools.product(*(parameter.search.starts for parameter in own.values()))
-    starts = [dict(zip(own, values, strict=True)) for values in grid]
-    return [np.array([_searched(u, s[u.parameter.name] * _share(problem, u)) for u in unknowns]) for s in starts]
+    unknowns = _new_unknowns(problem, before, effect)
+    parameters = {u.parameter.name: u.parameter for u in unknowns}
+
+    def searched(unknown: Unknown, start: float) -> float:
+        if unknown.node is not None and unknown.parameter.with_friction:
+            start *= problem.relative_friction(unknown.node)
+        return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
+
+    grid = itertools.product(*(parameter.search.starts for parameter in parameters.values()))
+    starts = [dict(zip(parameters, values, strict=True)) for values in grid]
+    return [np.array([searched(u, start[u.parameter.name]) for u in unknowns]) for start in starts]
 
 
-def _share(problem: Problem, unknown: Unknown) -> float:
-    """The share of its largest value at which an unknown starts at its voltage."""
-    scaled = unknown.node is not None and unknown.parameter.with_friction
-    return problem.friction_at(unknown.node or 0) if scaled else 1.0
+def towards_neutral(problem: Problem, before: FitResult, effect: Effect, start: Array, share: float) -> Array:
+    """Return starting values at a share of the way from those that switch the effect off."""
+    unknowns = _new_unknowns(problem, before, effect)
+    return np.array([u.to_search(u.towards_neutral(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
-def fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
-    """Starting values that lie so much nearer to those that switch the effect off."""
-    unknowns = _new(problem, before, effect)
-    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
-
-
-def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...]:
-    """What is looked for with an effect beside those of `before`."""
+def _new_unknowns(problem: Problem, before: FitResult, effect: Effect) -> tuple[Unknown, ...]:
+    """Return the unknowns of an effect beside those of `before`."""
     return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
 
 
-def _searched(unknown: Unknown, start: float) -> float:
-    return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
-
-
-def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array) -> float:
-    """Sum of squares after one linearised step from a start; infinite where the slopes there are not."""
+def _promised_misfit(problem: Problem, before: FitResult, effect: Effect, start: Array) -> float:
+    """Return the sum of squares after one linearised step from a start; infinite where the derivatives are."""
     effects = (*before.effects, effect.name)
     unknowns = problem.unknowns(effects)
-    here = np.concatenate([before.searched, start])
-    new = range(before.searched.size, here.size)
+    here = np.concatenate([before.optimum, start])
+    new = range(before.optimum.size, here.size)
     limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
-    left = left_at(problem, unknowns, here, limits, new)
-    r, columns = (not_taken_up(before.frame, values) for values in (left.whole, left.slopes.dense(new)))
+    left = linearise(problem, unknowns, here, limits, new)
+    r, columns = (projected_out(before.column_basis, values) for values in (left.stacked, left.jacobian.dense(new)))
     if not np.all(np.isfinite(columns)):
         return np.inf  # a power law whose flow stands still at a sample has no slope there
     size = np.linalg.norm(columns, axis=0)
@@ -117,10 +112,10 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
     return float(rest @ rest)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Candidates
 
 
-VARIES = ("stroke", "flow", "parallel", "branch")
+PLACES_PER_VOLTAGE = ("stroke", "flow", "parallel", "branch")
 """Places of effects whose parameters may differ by voltage."""
 
 
@@ -129,57 +124,49 @@ class Candidate:
     """One effect fitted together with the base rows and the effects adopted so far."""
 
     effect: str
-    fitted: Fitted
+    fitted: FitResult
     delta_bic: float
-    """Change of the Bayesian criterion against the model without it; negative where it pays."""
+    """Change of the Bayesian criterion against the model without it; negative where it improves."""
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
     residual_change: float
-    """Sum of squares of what it changes in the residuals, in units of noise."""
+    """Sum of squares of the change of the residuals, in units of noise."""
     misfit_drop: float
-    """How much lower the misfit is with it."""
+    """Decrease of the misfit."""
     varies: bool = False
-    """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
+    """Whether its parameters have one value per voltage: an effect adopted before, or one that is only tried so."""
     searched: bool = True
-    """Whether its optimum was searched for; else it stands as faint as it is looked for."""
+    """Whether its optimum was searched for; else it stands for the faintest values tried."""
 
 
-def seen_in(problem: Problem, effect: Effect) -> bool:
+def testable(problem: Problem, effect: Effect) -> bool:
     """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
     if effect.needs == "voltage":
-        return any(
-            o.motion.voltage is not None
-            and float(np.ptp(o.motion.voltage)) > MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
-            for o in problem.observations
-        )
+        span = MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
+        return any(o.motion.voltage is not None and np.ptp(o.motion.voltage) > span for o in problem.observations)
     if effect.needs == "temperature":
-        return any(np.ptp(warmth) > WARMS for warmth in _warmth(problem).values())
+        by_row: dict[int, list[float]] = {}
+        for o in problem.observations:
+            if o.motion.temperature is not None:
+                by_row.setdefault(o.base_row, []).extend(end_temperatures(o.motion.temperature))
+        return any(np.ptp(temperatures) > MOVING_TEMPERATURE for temperatures in by_row.values())
     return True
-
-
-def _warmth(problem: Problem) -> dict[int, list[float]]:
-    """Temperatures at the beginning and end of every test [degC], by base row."""
-    found: dict[int, list[float]] = {}
-    for o in problem.observations:
-        if o.motion.temperature is not None:
-            found.setdefault(o.place, []).extend(ends(o.motion.temperature))
-    return found
 
 
 def candidates(
     problem: Problem,
-    before: Fitted,
+    before: FitResult,
     forbidden: Sequence[str] = (),
     jobs: int = 1,
     *,
     silent: bool = False,
 ) -> tuple[Candidate, ...]:
-    """Every effect with a name that the tests could show, fitted beside those of `before`, best first.
+    """Fit every effect with a name that the tests could show beside those of `before`, best first.
 
     Parameters
     ----------
-    problem : what is fitted to what
-    before : the optimum with the effects adopted so far
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
     forbidden : effects that are not tried
     jobs : how many are fitted at the same time
     silent : noise explains what is left, so that only a faint effect can be missing
@@ -187,131 +174,141 @@ def candidates(
     tried = [
         effect
         for effect in nameable().values()
-        if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
+        if effect.name not in (*before.effects, *forbidden) and testable(problem, effect)
     ]
 
-    _ = before.frame  # asked of by every candidate: computed once, before they go to threads of their own
+    _ = before.column_basis  # every candidate needs it: computed once, before they go to threads of their own
 
     def promised(effect: Effect) -> float:
-        return promise(problem, before, effect) if _for(problem, effect) is problem else np.inf
+        return promised_drop(problem, before, effect) if _problem_for(problem, effect) is problem else np.inf
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         gains = list(pool.map(promised, tried))
         best = max((gain for gain in gains if np.isfinite(gain)), default=0.0)
-        least = max(LEAST_PROMISE if silent else SLIGHT_PROMISE, WORTH_FITTING * best)
+        least = max(LEAST_DROP_IN_NOISE if silent else LEAST_DROP_IN_GAP, SHARE_WORTH_FITTING * best)
 
         def one(effect: Effect, gain: float) -> Candidate:
-            return (candidate if gain >= least else _barely)(problem, before, effect)
+            return (candidate if gain >= least else _unsearched)(problem, before, effect)
 
         found = list(pool.map(one, tried, gains))
-        worth = WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
-        found = list(pool.map(lambda c: finished(problem, before, c) if c.delta_bic < worth else c, found))
+        worth = SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
+        found = list(pool.map(lambda c: resumed(problem, before, c) if c.delta_bic < worth else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
 
-def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
-    """A candidate whose search was broken off early, searched on from there."""
-    return _from(_for(problem, known()[found.effect]), before, found.effect, found.fitted.searched)
+def resumed(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
+    """Continue the search for a candidate that was broken off early."""
+    return _fitted_from(_problem_for(problem, known()[found.effect]), before, found.effect, found.fitted.optimum)
 
 
-def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
-    """One effect fitted beside those of `before`, from its most promising starting values.
+def candidate(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
+    """Fit one effect beside those of `before`, from its most promising starting values.
 
-    Others, then ever fainter ones, are tried only while what is reached is worse than without the effect: a search
-    that got stuck, for without the effect is one of its own values.
+    Others, then ever fainter ones, are tried only while the fit is worse than without the effect: such a search got
+    stuck, for being switched off is one of the effect's own values.
     """
-    problem, reached = _for(problem, effect), []
-    starts = promising_starts(problem, before, effect)
-    for start in (
-        *starts[:STARTS_TRIED],
-        *(fainter(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
-    ):
-        reached.append(
-            _from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST_EVALUATIONS)
-        )
-        if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
-            effect, reached[-1].fitted
-        ):
+    problem, reached = _problem_for(problem, effect), list[Candidate]()
+    starts = sorted_starts(problem, before, effect)
+    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in SMALLER_STARTS)
+    for start in itertools.chain(starts[:STARTS_TRIED], faint):
+        whole_start = np.concatenate([_search_start(problem, before), start])
+        reached.append(_fitted_from(problem, before, effect.name, whole_start, FIRST_EVALUATIONS))
+        fitted = reached[-1].fitted
+        if fitted.misfit <= before.misfit + STUCK_MISFIT or _switched_off(effect, fitted):
             break
     return min(reached, key=lambda c: c.fitted.misfit)
 
 
-def _switched_off(effect: Effect, fitted: Fitted) -> bool:
-    """Whether the search of an effect's only parameter went to the limit below which lies zero, its absence."""
+def _switched_off(effect: Effect, fitted: FitResult) -> bool:
+    """Whether the search for an effect's only parameter ended at the limit next to zero, its absence."""
     (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
     vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
-    return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
+    return vanishes and bool(fitted.optimum[-1] - nearest < SEARCH_LIMIT_MARGIN)
 
 
-def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
-    """An effect as faint as it is looked for."""
-    start = fainter(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
-    return replace(_from(problem, before, effect.name, np.concatenate([before.searched, start]), 1), searched=False)
+def _unsearched(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
+    """Return an effect at the faintest values tried, without a search."""
+    start = towards_neutral(problem, before, effect, starts_of(problem, before, effect)[0], SMALLER_STARTS[-1])
+    return replace(
+        _fitted_from(problem, before, effect.name, np.concatenate([before.optimum, start]), 1), searched=False
+    )
 
 
-def best_confounder(problem: Problem, before: Fitted) -> Candidate:
-    """Fit every confounder as a candidate, and return the one that explains most."""
+def best_confounder(problem: Problem, before: FitResult) -> Candidate:
+    """Fit the confounders (laws outside the library) as candidates, and return the best."""
     tried = (converged(problem, before, candidate(problem, before, form)) for form in confounders().values())
     return min(tried, key=lambda c: c.delta_bic)
 
 
-def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
-    """Every effect of `before` whose parameters may differ by voltage, fitted so."""
+def per_voltage_candidates(problem: Problem, before: FitResult) -> list[Candidate]:
+    """Fit every effect of `before` whose parameters may differ by voltage with one value per voltage."""
     if len(problem.voltages) == 1:
         return []
-    fixed = [library()[name] for name in before.effects if name not in problem.varying]
-    free = [e.name for e in fixed if e.place in VARIES and not e.same_at_every_voltage]
-    return [_varied(problem, before, name) for name in free]
+    shared = [library()[name] for name in before.effects if name not in problem.per_voltage]
+    free = [e.name for e in shared if e.place in PLACES_PER_VOLTAGE and not e.same_at_every_voltage]
+    return [_fitted_per_voltage(problem, before, name) for name in free]
 
 
-def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
-    wider = replace(problem, varying=problem.varying | {effect})
+def _fitted_per_voltage(
+    problem: Problem, before: FitResult, effect: str, evaluations: int = MOST_EVALUATIONS
+) -> Candidate:
+    wider = replace(problem, per_voltage=problem.per_voltage | {effect})
     fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
     return replace(as_candidate(problem, before, effect, fitted), varies=True)
 
 
-def as_candidate(problem: Problem, before: Fitted, effect: str, fitted: Fitted) -> Candidate:
-    """An optimum with an effect more than `before` has, as what was tried in that step."""
-    return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted))
+def as_candidate(
+    problem: Problem, before: FitResult, effect: str, fitted: FitResult, pays: float | None = None
+) -> Candidate:
+    """Describe an optimum with one more effect than `before` as a candidate; `pays` where its criterion is known."""
+    pairs = zip(before.residuals, fitted.residuals, strict=True)
+    return Candidate(
+        effect,
+        fitted,
+        delta_bic(before, fitted) if pays is None else pays,
+        force_change(problem, before, fitted),
+        sum(float((after - old) @ (after - old)) for old, after in pairs),
+        before.misfit - fitted.misfit,
+    )
 
 
-def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
-    """A candidate with its optimum searched to the end, from all its starting values."""
+def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
+    """Search a candidate to its optimum, from all its starting values."""
     if found.varies:
-        return _varied(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
+        return _fitted_per_voltage(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
     effect = known()[found.effect]
-    problem = _for(problem, effect)
-    others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
+    problem = _problem_for(problem, effect)
+    others = [np.concatenate([_search_start(problem, before), s]) for s in sorted_starts(problem, before, effect)[1:]]
     fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
-    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
+    return _fitted_from(problem, before, found.effect, best.optimum, MOST_EVALUATIONS_OF_BEST)
 
 
 def nearly_as_good(
-    problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]
+    problem: Problem, before: FitResult, chosen: Candidate, tried: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
-    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    """Return the candidates of a step, those nearly as good as the chosen one searched to their optimum as well."""
     near = NEARLY_AS_GOOD * chosen.delta_bic
     return tuple(
         converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
     )
 
 
-def _for(problem: Problem, effect: Effect) -> Problem:
-    """The problem that an effect is tried on: what changes the base with heat stands for its temperature axis."""
-    return problem.pooled() if effect.place == "material" else problem
+def _problem_for(problem: Problem, effect: Effect) -> Problem:
+    """Return the problem on which an effect is tried: a material effect replaces the temperature axis."""
+    return problem.pooled_temperatures() if effect.place == "material" else problem
 
 
-def _base(problem: Problem, before: Fitted) -> Array:
-    """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
-    rows = before.searched.size - len(before.unknowns)
-    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before.damper)
+def _search_start(problem: Problem, before: FitResult) -> Array:
+    """Return (3 b + e,) starting values of the base rows and the effects of `before`."""
+    rows = before.optimum.size - len(before.unknowns)
+    return before.optimum if rows == 3 * len(problem.base) else problem.start_with(before.damper)
 
 
-def _from(
-    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
+def _fitted_from(
+    problem: Problem, before: FitResult, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
 ) -> Candidate:
-    """An effect fitted from a start."""
+    """Fit an effect from a start."""
     fitted = fit(problem, (*before.effects, effect), start, evaluations)
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
@@ -320,26 +317,20 @@ def _from(
         own = len(fitted.unknowns) - len(before.unknowns)
         alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
         pays = max(pays, alone, delta_bic(pooled, fitted))
-    return Candidate(effect, fitted, pays, *_changed(problem, before, fitted))
+    return as_candidate(problem, before, effect, fitted, pays)
 
 
-def _changed(problem: Problem, before: Fitted, after: Fitted) -> tuple[float, float, float]:
-    """What a candidate changes: the force, the residuals, the misfit."""
-    changed = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
-    return moved_by(problem, before, after), changed, before.misfit - after.misfit
-
-
-def delta_bic(before: Fitted, after: Fitted) -> float:
+def delta_bic(before: FitResult, after: FitResult) -> float:
     """Change of the Bayesian information criterion.
 
     Equation: BIC = |r|^2 + p ln n                                  Source: Schwarz 1978
     """
-    more = after.searched.size - before.searched.size
+    more = after.optimum.size - before.optimum.size
     return after.misfit - before.misfit + more * float(np.log(after.size))
 
 
-def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
-    """R.m.s. difference of two simulated forces, each record in units of its peak."""
+def force_change(problem: Problem, before: FitResult, after: FitResult) -> float:
+    """Compute the r.m.s. difference of two simulated forces, each record in units of its peak."""
     squares = [
         np.mean((a - b) ** 2) / o.peak**2
         for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)

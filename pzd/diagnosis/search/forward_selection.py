@@ -1,4 +1,4 @@
-"""From candidates to adopted effects: one after another, as long as the data support the next by themselves."""
+"""Forward selection: effects are adopted one after another, as long as the data support the next by themselves."""
 
 from __future__ import annotations
 
@@ -12,88 +12,85 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import Fitted, fit, standard_errors
-from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.fit.least_squares import FitResult, fit, standard_errors
+from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import (
     MAY_BE_CHANCE,
-    MAY_BE_OF_THE_TESTS,
-    Competition,
+    MAY_BE_TEST_SCATTER,
+    ConfounderMatch,
     Detection,
-    Round,
     Selection,
-    closes,
+    SelectionStep,
+    closes_gap,
     detections,
+    insufficient_support,
     leaves_gap,
     rivals_of,
     spurious,
-    unsupported,
 )
 from pzd.diagnosis.search.candidates import (
     Candidate,
     as_candidate,
     best_confounder,
-    by_voltage,
     candidate,
     candidates,
     converged,
     delta_bic,
-    moved_by,
+    force_change,
     nearly_as_good,
+    per_voltage_candidates,
 )
-from pzd.diagnosis.search.evidence import Evidence, evidence_of
-from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
-
-# ----------------------------------------------------------------------------------------------------
-# Iteratively reweighted fits, until the parameters no longer depend on the damper that the weights came from.
+from pzd.diagnosis.thresholds import CONVERGED_CHANGE, LARGEST_GAP_GROWTH, MOST_REWEIGHTINGS
 
 
-def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
-    """The evidence weighed by what an optimum leaves and the optimum by that evidence, in turn until neither moves.
+def reweighted(
+    weigh: Callable[[Damper], Evidence], evidence: Evidence, current: FitResult
+) -> tuple[Evidence, FitResult]:
+    """Iterate fit and weights until the parameters no longer depend on the damper that the weights came from.
 
     The delay of a test acts along the slope of the force that the damper gives, and shifts its corners.
 
     Parameters
     ----------
-    weighed : the evidence by what a damper leaves
-    evidence : by which the optimum was found
-    current : the optimum with the effects adopted
+    weigh : gives the evidence weighed by what a damper leaves
+    evidence : of the present optimum
+    current : optimum with the adopted effects
     """
     for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
-        before, evidence = current, weighed(current.damper)
+        before, evidence = current, weigh(current.damper)
         current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
-        moved = [abs(u.of(current.damper) - u.of(before.damper)) for u in before.unknowns]
-        if np.all(moved <= AT_REST * standard_errors(current)):
+        moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
+        if np.all(moved <= CONVERGED_CHANGE * standard_errors(current)):
             break
     return evidence, current
 
 
-# ----------------------------------------------------------------------------------------------------
-# Every other effect in the place of one adopted early, beside all that was adopted after it.
+# --- Swap step (exchange): other effects in the place of one adopted early
 
 
-def contest(
+def swap_step(
     problem: Problem,
-    without: Fitted,
+    without: FitResult,
     name: str,
-    current: Fitted,
+    current: FitResult,
     refused: Callable[[Candidate], str | None],
     config: DiagnoseConfig,
     jobs: int,
-) -> tuple[Round, Candidate]:
-    """The step in which an effect was adopted, taken again; and what is adopted in it.
+) -> tuple[SelectionStep, Candidate]:
+    """Repeat the step in which an effect was adopted, with all effects adopted since; return what it adopts now.
 
     What came first was chosen beside less than is adopted now, and may have stood in for what came later. It stays
-    where nothing that the data support is better by more than rivals differ, and nature has its values.
+    unless something that the data support is better by more than rivals differ, or its own values are impossible.
 
     Parameters
     ----------
-    problem : what is fitted to what
-    without : the optimum with all that was adopted but this effect
+    problem : observations and starting values
+    without : optimum with all adopted effects but this one
     name : of the effect
-    current : the optimum with it
-    refused : why the data do not support a candidate beside `without`, None where they do
+    current : optimum with it
+    refused : gives why the data do not support a candidate beside `without`, None where they do
     config : how near a rival comes
     jobs : candidates fitted at the same time
     """
@@ -101,93 +98,97 @@ def contest(
     tried = [c for c in candidates(problem, without, config.forbid, jobs) if c.effect != name]
     ended = sorted((own, *nearly_as_good(problem, without, own, tried)), key=lambda c: c.delta_bic)
     close = [c for c in ended if c is not own and c.delta_bic - own.delta_bic < config.rival_bic]
-    stand_ins = frozenset(c.effect for c in close if refused(c))
-    alike = [c for c in close if c.effect not in stand_ins]
-    kept = next((c for c in alike if _better(c, own, config.rival_bic)), own)
-    return Round(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), stand_ins), kept
+    spurious_effects = frozenset(c.effect for c in close if refused(c))
+    alike = [c for c in close if c.effect not in spurious_effects]
+    kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
+    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), spurious_effects), kept
 
 
-def _better(other: Candidate, own: Candidate, rival_bic: float) -> bool:
-    """Whether a candidate takes the place of the effect adopted."""
+def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
+    """Whether a candidate replaces the adopted effect."""
     if against_nature(other.fitted.damper):
         return False
     return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Forward selection
 
 
 log = logging.getLogger(__name__)
 
 
 def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
-    """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
+    """Adopt effects one after another while the next improves the fit, is supported by itself, and a gap is left.
 
     Parameters
     ----------
     campaign : the records of one setting
-    damper : plain, where the fits start
+    damper : baseline, at which the fits start
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
-    weighed = partial(evidence_of, campaign)
-    first = weighed(damper)
-    plain = fit(first.whole, (), first.whole.start())
-    search = _Search(config, weighed, jobs, damper, first, plain)
+    weigh = partial(evidence_of, campaign)
+    evidence = weigh(damper)
+    search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
     search.choose_temperature_axis()
-    first, plain = search.evidence, search.current
-    search.force()
-    while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
+    initial_evidence, baseline = search.evidence, search.current
+    search.adopt_forced()
+    while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():
         pass
-    search.contest()
-    search.rest()
-    undecided, competitions = search.undecided(), search.competitions()
-    rounds, reasons = tuple(search.rounds), search.reasons
+    search.swap()
+    search.reweight_until_stable()
+    undecided = search.undecided()  # gives reasons as well
     return Selection(
-        plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided, search.left_open
+        baseline,
+        search.current,
+        tuple(search.steps),
+        search.reasons,
+        initial_evidence,
+        search.evidence,
+        search.competing_confounders(),
+        undecided,
+        search.open_detections,
     )
 
 
 @dataclass(eq=False)
-class _Search:
-    """State of the forward selection: the current fit, the rounds so far, and why each effect was adopted or not."""
+class _ForwardSelection:
+    """State of the forward selection: current fit, steps so far, and why each effect was adopted or not."""
 
     config: DiagnoseConfig
-    weighed: Callable[[Damper], Evidence]
+    weigh: Callable[[Damper], Evidence]
     jobs: int
     identified: Damper
-    """Plain, with the base rows of identify."""
+    """Baseline with the base rows of identify."""
     evidence: Evidence
     """Weighed by what the current damper leaves."""
-    current: Fitted
-    rounds: list[Round] = field(default_factory=list)
+    current: FitResult
+    steps: list[SelectionStep] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
-    left_open: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
+    open_detections: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
 
-    def force(self) -> None:
+    def adopt_forced(self) -> None:
         """Adopt what the config asks for."""
         for name in self.config.force:
             self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
             self.reasons[name] = "adopted because the config asks for it"
 
     def choose_temperature_axis(self) -> None:
-        """Keep T0, C, k by temperature where that pays, and more than an effect would; else one row a voltage.
+        """Keep rows by temperature where they improve the criterion more than an effect; else one per voltage.
 
         Rows by temperature follow each test's own gain, and bend between the tests what is missing.
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        whole = self.weighed(
-            self.identified.model_copy(
-                update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
-            )
-        ).whole
-        few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
-        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
+        effects, damper = self.current.effects, self.current.damper
+        kept = {"effects": damper.effects, "zero_m": damper.zero_m}
+        whole = self.weigh(self.identified.model_copy(update=kept)).whole
+        pooled = whole.pooled_temperatures()
+        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, pooled))
         pays = delta_bic(one, rows)
         if pays <= self.config.adopt_bic and not effects:
             drifts = tuple(name for name, effect in library().items() if effect.place == "material")
-            tried = candidates(few, one, (*self.config.forbid, *drifts), self.jobs)
+            tried = candidates(pooled, one, (*self.config.forbid, *drifts), self.jobs)
             pays -= min((c.delta_bic for c in tried), default=0.0)
         self._reweight(rows if pays <= self.config.adopt_bic else one)
 
@@ -195,31 +196,31 @@ class _Search:
         return any(library()[name].place == "material" for name in self.current.effects)
 
     def step(self) -> bool:
-        """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
-        tried = self._tried(self.evidence, self.current)
-        steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
-        first = self._first_supported(steps)
+        """Adopt one more effect, an adopted one per voltage, or a supported pair; return whether any was."""
+        tried = self._candidates(self.evidence, self.current)
+        steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
+        first = self._best_supported(steps)
         if first is None:
             return self._pair(tried)
-        ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
-        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _before(first, steps))
+        ended = converged(self.evidence.whole, self.current, self._physically_possible(first, steps))
+        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _ranked_above(first, steps))
         return True
 
-    def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
-        """Of the candidates that pay as much as the first and are supported, one with values that nature has."""
+    def _physically_possible(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
+        """Return the best supported candidate with possible values of those as good as the first; else the first."""
         if not against_nature(first.fitted.damper):
             return first
         alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
-        return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
+        return self._best_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
 
-    def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
+    def _candidates(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
             return ()
-        silent = not evidence.something_missing(current, self.config)
+        silent = not evidence.gap_is_significant(current, self.config)
         return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
 
-    def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
-        """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
+    def _best_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
+        """Return the best candidate that the data support by itself; a better one that fails is spurious."""
         for each in tried:
             reason = self._refused(self.config, each)
             if reason is None:
@@ -230,147 +231,149 @@ class _Search:
                 break
         return None
 
-    def _too_little(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
-        return unsupported(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+    def _reason_against(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
+        return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
-    def _leaves_gap(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
-        """Why a candidate is a stand-in by the gap that it leaves open, weighed by what is left without it or with it.
+    def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
+        """Say why a candidate is spurious by the gap that it leaves, weighed by the residual without it and with it.
 
-        What is left without it is slow: beside that the fit goes by what is quick, where the displacement is known
-        worst, and T0, C and k are bent.
+        What is left without it is slow: with these weights the fit follows what is quick, where the displacement is
+        known worst, and T0, C and k are bent.
         """
         reason = leaves_gap(evidence, self.config, before, each)
         if reason is None or each.varies:
             return reason
-        whole = self.weighed(each.fitted.damper).whole
+        whole = self.weigh(each.fitted.damper).whole
         again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
         return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
-        missing = self.evidence.something_missing(self.current, self.config)
-        lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
+        missing = self.evidence.gap_is_significant(self.current, self.config)
+        leads = (c for c in tried if missing and self._reason_against(self.evidence, self.current, c) is None)
+        lead = next(leads, None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
-            self.left_open = detections(self.evidence.whole, self.current, tried)
+            self.open_detections = detections(self.evidence.whole, self.current, tried)
             # Once noise explains what is left, the round that adopted something tells more of the others.
-            self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
+            self.steps += [SelectionStep(tried, None)] if tried and (missing or not self.steps) else []
             return False
-        self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
+        self.steps.append(SelectionStep(tried, lead.effect, rejected=_ranked_above(lead, tried)))
         self.reasons[lead.effect] = "adopted"
         self._adopt(*found)
         return True
 
     def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
-        """The effect that is supported together with another one, what else was tried beside that, and was refused."""
-        evidence = self.weighed(lead.fitted.damper)
+        """Return the effect that is supported together with another, what else was tried, and what was refused."""
+        evidence = self.weigh(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
-        seconds = self._tried(evidence, at)
-        best = next((c for c in seconds if self._too_little(evidence, at, c) is None), None)
+        seconds = self._candidates(evidence, at)
+        best = next((c for c in seconds if self._reason_against(evidence, at, c) is None), None)
         if best is None:
             return None
         both = converged(evidence.whole, at, best)
-        if not closes(self.evidence, self.config, self.current, both):
+        if not closes_gap(self.evidence, self.config, self.current, both):
             return None
-        failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _before(best, seconds))
+        if spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
+            return None
+        return both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds)
 
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
-            step = Round(finished, chosen.effect, refused=refused)
-            self.rounds.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
+            step = SelectionStep(finished, chosen.effect, rejected=refused)
+            self.steps.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
         self.choose_temperature_axis()
         for name in self.current.effects[len(self.config.force) : -1]:
             self._drop_needless(name, chosen.effect)
 
-    def _reweight(self, found: Fitted) -> None:
-        """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
-        self.evidence = self.weighed(found.damper)
+    def _reweight(self, found: FitResult) -> None:
+        """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap."""
+        self.evidence = self.weigh(found.damper)
         whole = self.evidence.whole
         start = whole.start_with(found.damper)
         self.current = fit(whole, found.effects, start)
-        if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
+        if self._gap(self.current) > max(LARGEST_GAP_GROWTH * self._gap(found), self.config.negligible):
             self.current = fit(whole, found.effects, start, evaluations=1)
 
-    def contest(self) -> None:
-        """Try the others again in the place of each effect adopted before the last, and keep what does better."""
+    def swap(self) -> None:
+        """Repeat the step of each effect adopted before the last, and keep what does better."""
         for name in self.current.effects[len(self.config.force) : -1]:
-            step = next((i for i, each in enumerate(self.rounds) if each.chosen == name), None)
-            fixed = name in self.evidence.whole.varying or library()[name].place == "material"
-            if step is None or fixed or not self.evidence.campaign.work.may_go_on():
+            step = next((i for i, each in enumerate(self.steps) if each.chosen == name), None)
+            fixed = name in self.evidence.whole.per_voltage or library()[name].place == "material"
+            if step is None or fixed or not self.evidence.campaign.budget.allows_more():
                 continue
             without = self._without(name)
             refused = partial(self._refused, self.config, before=without)
             whole = self.evidence.whole
-            self.rounds[step], best = contest(whole, without, name, self.current, refused, self.config, self.jobs)
+            self.steps[step], best = swap_step(whole, without, name, self.current, refused, self.config, self.jobs)
             if best.effect != name:
                 self.reasons[name] = f"stand-in: {best.effect} does better beside what was adopted later"
                 self.reasons[best.effect] = "adopted"
                 self._reweight(best.fitted)
 
-    def rest(self) -> None:
-        """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
-        evidence, current = reweighted(self.weighed, self.evidence, self.current)
-        if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
+    def reweight_until_stable(self) -> None:
+        """Iterate fit and weights until no parameter moves, unless that widens the gap."""
+        evidence, current = reweighted(self.weigh, self.evidence, self.current)
+        if self._gap(current) <= max(LARGEST_GAP_GROWTH * self._gap(self.current), self.config.negligible):
             self.evidence, self.current = evidence, current
 
-    def _gap(self, fitted: Fitted) -> float:
+    def _gap(self, fitted: FitResult) -> float:
         return self.evidence.gap(fitted)
 
-    def _without(self, effect: str) -> Fitted:
-        """The optimum with one of the adopted effects left out."""
+    def _without(self, effect: str) -> FitResult:
+        """Fit without one of the adopted effects."""
         whole, damper = self.evidence.whole, self.current.damper
         effects = {name: values for name, values in damper.effects.items() if name != effect}
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
-    def competitions(self) -> tuple[Competition, ...]:
-        """Return the confounders that fit as well as an adopted effect, in its place."""
+    def competing_confounders(self) -> tuple[ConfounderMatch, ...]:
+        """Return the confounders that would do as well as an adopted effect, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            form = best_confounder(self.evidence.whole, without)
-            behind = form.delta_bic - delta_bic(without, self.current)
-            if behind < self.config.rival_bic:
-                found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))
+            other = best_confounder(self.evidence.whole, without)
+            difference = other.delta_bic - delta_bic(without, self.current)
+            if difference < self.config.rival_bic:
+                found.append(ConfounderMatch(name, self.current.damper, other.effect, other.fitted.damper, difference))
         return tuple(found)
 
     def undecided(self) -> tuple[str, ...]:
-        """Where nothing was adopted, the effects that are rivals of none, each with its reason."""
-        if self.current.effects or not self.rounds:
+        """Return the effects that fit better where nothing was adopted but are rivals of none, each with its reason."""
+        if self.current.effects or not self.steps:
             return ()
-        short = [c for c in self.rounds[-1].tried if c.delta_bic > self.config.adopt_bic]
+        short = [c for c in self.steps[-1].tried if c.delta_bic > self.config.adopt_bic]
         best = min((c.delta_bic for c in short), default=0.0)
         if best <= -self.config.rival_bic:
             lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
                     self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
-        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_OF_THE_TESTS, MAY_BE_CHANCE))
+        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_TEST_SCATTER, MAY_BE_CHANCE))
 
-    def _refused(self, config: DiagnoseConfig, each: Candidate, before: Fitted | None = None) -> str | None:
-        """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
+    def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
+        """Say why a candidate is too little, or spurious; None where the data support it by itself."""
         evidence, before = self.evidence, before or self.current
         return (
-            unsupported(evidence, config, each)
+            insufficient_support(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
-            or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
+            or spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
         )
 
     def _drop_needless(self, effect: str, newest: str) -> None:
-        """Take back an effect adopted earlier that no longer pays or no longer moves the force."""
+        """Remove an earlier effect that no longer improves the criterion or no longer moves the force."""
         whole, current = self.evidence.whole, self.current
         if library()[effect].place == "material":
             return
         without = self._without(effect)
         pays = delta_bic(without, current) <= self.config.adopt_bic
-        if not pays or moved_by(whole, without, current) < self.config.visible:
+        if not pays or force_change(whole, without, current) < self.config.visible:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
 
 
-def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
-    """The effects that promised more than the one chosen: they were refused."""
+def _ranked_above(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
+    """Return the effects that ranked above the chosen one: they were refused."""
     return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)

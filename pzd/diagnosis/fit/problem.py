@@ -1,4 +1,4 @@
-"""What is fitted to what: T0, C, k of every base row and the parameters of effects."""
+"""The least-squares problem: T0, C, k of every base row and the parameters of effects in the units of the search."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from typing import cast
 
 import numpy as np
 
+from pzd.damper.compiled.rows import Nodes, nodes_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import Effect, Parameter, Scales, Search
+from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
-from pzd.diagnosis.fit.likelihood import RecordLikelihood
+from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# How much a diagnosis may simulate before it ends with what it knows: work, not time, so that a result repeats.
+# --- Budget of simulations
 
 
 @dataclass(eq=False)
-class Work:
-    """What has been simulated so far, and how much may be.
+class Budget:
+    """Count of simulated samples, and the limit at which the search ends with what it knows.
 
-    It is counted in forces at samples, whoever asks for them, and looked at only where every thread has come to rest:
-    so the same input ends at the same place.
+    It counts forces at samples, whoever asks for them, and is checked only between steps of the search, when every
+    thread has finished: so the same input ends at the same place, as a limit in seconds would not.
     """
 
-    most: float = float("inf")
+    limit: float = float("inf")
     """Forces that may be computed."""
     spent: int = 0
     """Forces computed."""
-    ended: bool = False
-    """Whether the search has been kept from a further step."""
+    exhausted: bool = False
+    """Whether the search was kept from a further step."""
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def add(self, samples: int) -> None:
@@ -42,29 +42,29 @@ class Work:
         with self._lock:
             self.spent += samples
 
-    def may_go_on(self) -> bool:
-        """Whether anything more is to be looked for; asked between one step of the search and the next."""
-        self.ended = self.ended or self.spent >= self.most
-        return not self.ended
+    def allows_more(self) -> bool:
+        """Whether the search may go on; asked between one step and the next."""
+        self.exhausted = self.exhausted or self.spent >= self.limit
+        return not self.exhausted
 
     @property
-    def words(self) -> str:
-        """What a verdict says of a search that has been ended; empty for one that came to its own end."""
-        if not self.ended:
+    def note(self) -> str:
+        """Sentence of the verdict on a search that was ended; empty for one that came to its own end."""
+        if not self.exhausted:
             return ""
         return (
-            f"; the search was ended by diagnose.most_evaluations ({self.most:.3g} forces): a larger one, or shorter "
+            f"; the search was ended by diagnose.most_evaluations ({self.limit:.3g} forces): a larger one, or shorter "
             "records, may tell more"
         )
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Unknowns and the problem
 
 
 SOFTEST = 0.1
 """Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
 BOUND = 1e4
-"""No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+"""Limit of scaled parameters, and of the inverse of those searched by their logarithm."""
 ZERO = Parameter(
     "zero_m",
     "m",
@@ -74,7 +74,8 @@ ZERO = Parameter(
     "zero of the displacement, from the middle of the stroke",
     Search(lambda s: s.stroke, (0.0,), within=(-0.3, 0.3)),
 )
-"""Looked for once, beside the first effect that depends on it. It lies near the middle of what was recorded."""
+"""Zero of the displacement, searched once, beside the first effect that depends on it; near the middle of the stroke.
+"""
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,11 @@ class Unknown:
     parameter: Parameter
     scale: float
     node: int | None = None
-    """Index of the voltage it holds at; None for one value at every voltage."""
+    """Index of its voltage; None for one value at every voltage."""
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Limits of the searched variable."""
+        """Limits of the search variable."""
         low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
         if self.parameter.search.logarithmic:
             return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
@@ -97,86 +98,88 @@ class Unknown:
         return max(low, least, -BOUND), min(high, most, BOUND)
 
     def value(self, searched: float) -> float:
-        """The parameter in its own unit."""
+        """Return the parameter in its own unit at a value of the search variable."""
         scaled = float(np.exp(searched)) if self.parameter.search.logarithmic else searched
         return float(np.clip(scaled * self.scale, self.parameter.low, self.parameter.high))
 
-    def searched(self, value: float) -> float:
-        """The searched variable at a value of the parameter."""
+    def to_search(self, value: float) -> float:
+        """Return the search variable at a value of the parameter."""
         scaled = value / self.scale
         return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
 
-    def fainter(self, searched: float, share: float) -> float:
-        """The parameter [own unit] so much nearer to the value that switches its effect off."""
+    def towards_neutral(self, searched: float, share: float) -> float:
+        """Return the parameter [own unit] at a share of the way from its neutral value, where the effect is off."""
         value, neutral = self.value(searched), self.parameter.neutral
         return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
 
-    def of(self, damper: Damper) -> float:
-        """The value [own unit] that a damper has."""
+    def value_in(self, damper: Damper) -> float:
+        """Return the value [own unit] that a damper has."""
         if self.parameter is ZERO:
             return damper.zero_m
         value = damper.effects[self.effect][self.parameter.name]
         return value if isinstance(value, float) else value[self.node or 0]
 
-    def slope(self, searched: float) -> float:
-        """Derivative of the parameter by the searched variable."""
+    def derivative(self, searched: float) -> float:
+        """Return the derivative of the parameter by the search variable."""
         return self.scale * (float(np.exp(searched)) if self.parameter.search.logarithmic else 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted to what."""
+    """Observations, starting values and limits of a fit."""
 
-    observations: tuple[RecordLikelihood, ...]
+    observations: tuple[WeightedRecord, ...]
     base: tuple[BaseRow, ...]
     """Labels and starting values of the base rows."""
     scales: Scales
-    fastest: float
-    """Largest k / C that is looked for [1/s]: an element that answers within a sample shows no spring."""
-    reference: float | None = None
-    """T_ref for temperature drift [degC]."""
-    varying: frozenset[str] = frozenset()
-    """Effects whose parameters are numbers by voltage, one a voltage of the base rows."""
-    work: Work = field(default_factory=Work, repr=False)
+    largest_rate: float
+    """Largest k / C that is searched [1/s]: an element that responds within a sample shows no spring."""
+    reference_temperature: float | None = None
+    """T_ref of the temperature drift [degC]."""
+    per_voltage: frozenset[str] = frozenset()
+    """Effects whose parameters have one value per voltage of the base rows."""
+    budget: Budget = field(default_factory=Budget, repr=False)
     """Counts what is simulated."""
 
     @cached_property
     def voltages(self) -> tuple[float, ...]:
         """(v,) voltages of the base rows [V], rising."""
-        return tuple(voltage for voltage, _ in rows_per_voltage(self.base))
+        return tuple(voltage for voltage, _ in by_voltage(self.base))
 
     @cached_property
     def nodes(self) -> tuple[int, ...]:
         """(b,) index of the voltage of every base row."""
-        place = {id(row): i for i, (_, rows) in enumerate(rows_per_voltage(self.base)) for row in rows}
+        place = {id(row): i for i, (_, rows) in enumerate(by_voltage(self.base)) for row in rows}
         return tuple(place[id(row)] for row in self.base)
 
-    def pooled(self) -> Problem:
-        """The same with one base row a voltage, whatever the temperature: an effect stands for its axis then."""
-        groups = [rows for _, rows in rows_per_voltage(self.base)]
+    def pooled_temperatures(self) -> Problem:
+        """Return the problem with one base row per voltage, for effects that replace the temperature axis."""
+        groups = [rows for _, rows in by_voltage(self.base)]
         if len(groups) == len(self.base):
             return self
         place = {id(row): i for i, rows in enumerate(groups) for row in rows}
-        moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
+        moved = tuple(
+            o if o.base_row < 0 else replace(o, base_row=place[id(self.base[o.base_row])]) for o in self.observations
+        )
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
 
-    def growing(self, effect: Effect) -> Problem:
-        """The same with an effect by voltage where its parameters go with T0."""
+    def with_friction_scaling(self, effect: Effect) -> Problem:
+        """Return the problem with an effect's parameters per voltage if they scale with T0."""
         by_voltage = len(self.voltages) > 1 and any(parameter.with_friction for parameter in effect.parameters)
-        return replace(self, varying=self.varying | {effect.name}) if by_voltage else self
+        return replace(self, per_voltage=self.per_voltage | {effect.name}) if by_voltage else self
 
-    def friction_at(self, node: int) -> float:
-        """Where T0 of the base rows starts at one of the voltages, as a share of the largest."""
+    def relative_friction(self, node: int) -> float:
+        """Return the starting T0 at one of the voltages, as a share of the largest."""
         here = max(row.T0_N for row, at in zip(self.base, self.nodes, strict=True) if at == node)
         return here / (max(row.T0_N for row in self.base) or 1.0)
 
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
-        """The parameters of some effects, in the order of the search, and the zero behind the first that needs it."""
+        """List the parameters of some effects in search order, the zero behind the first effect that needs it."""
         found: list[Unknown] = []
         for name in effects:
-            nodes = range(len(self.voltages)) if name in self.varying else (None,)
+            nodes = range(len(self.voltages)) if name in self.per_voltage else (None,)
             found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
-            if known()[name].needs_displacement_zero and all(u.parameter is not ZERO for u in found):
+            if known()[name].about_zero and all(u.parameter is not ZERO for u in found):
                 found.append(self._unknown(name, ZERO, None))
         return tuple(found)
 
@@ -184,20 +187,20 @@ class Problem:
         return Unknown(effect, parameter, parameter.search.scale(self.scales) or 1.0, node)
 
     def start(self) -> Array:
-        """(3 b,) the base rows in the units of the search."""
+        """Return the (3 b,) base rows in the units of the search: T0 / largest force, ln C, ln k."""
         softest = SOFTEST * self.scales.force / self.scales.speed
         damping = [max(r.C_Ns_per_m, softest) for r in self.base]
-        stiffness = [min(r.k_N_per_m, self.fastest * C) for r, C in zip(self.base, damping, strict=True)]
+        stiffness = [min(r.k_N_per_m, self.largest_rate * C) for r, C in zip(self.base, damping, strict=True)]
         rows = zip(self.base, damping, stiffness, strict=True)
         return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
 
     def start_with(self, damper: Damper) -> Array:
-        """(3 b + e,) the base rows, and the effects that a damper has."""
+        """Return the (3 b + e,) base rows and the effects of a damper in the units of the search."""
         unknowns = self.unknowns(tuple(damper.effects))
-        return np.concatenate([self.start(), [u.searched(u.of(damper)) for u in unknowns]])
+        return np.concatenate([self.start(), [u.to_search(u.value_in(damper)) for u in unknowns]])
 
     def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
-        """What a point of the search stands for."""
+        """Return the parameters at a point of the search."""
         split = 3 * len(self.base)
         base = searched[:split].reshape(-1, 3)
         values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
@@ -213,7 +216,7 @@ class Problem:
 
 
 def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
-    """One row for several temperatures or none: means of T0, C and k."""
+    """Average T0, C and k over several temperatures."""
     friction, damping, stiffness = np.mean([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in rows], axis=0)
     return BaseRow(
         voltage_V=rows[0].voltage_V,
@@ -225,16 +228,16 @@ def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Numbers for T0, C and k of every base row, and for the effects."""
+    """Values of T0, C and k of every base row, and of the effects."""
 
     base: Array
-    """(b, 3)"""
+    """(b, 3) T0 [N], C [N s/m], k [N/m]."""
     effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
-    """Lists are by voltage."""
+    """Values by effect and parameter; tuples are per voltage."""
     problem: Problem
-    zero: float = 0.0
-    """Of the displacement [m]."""
-    _laid_out: dict[float | None, DamperNodes] = field(default_factory=dict, repr=False)
+    displacement_zero: float = 0.0
+    """Zero of the displacement [m]."""
+    _nodes_by_temperature: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
 
     @cached_property
     def damper(self) -> Damper:
@@ -251,26 +254,26 @@ class Point:
         )
         return Damper(
             base=rows,
-            effects={name: {**values, **self._nodes(name)} for name, values in self.effects.items()},
-            reference_temperature_degC=self.problem.reference,
-            zero_m=self.zero,
+            effects={name: {**values, **self._node_voltages(name)} for name, values in self.effects.items()},
+            reference_temperature_degC=self.problem.reference_temperature,
+            zero_m=self.displacement_zero,
         )
 
-    def nodes(self, temperature: float | None) -> DamperNodes:
-        """The damper at one temperature [degC], by its nodes of voltage; at any the same where nothing goes by it."""
+    def nodes(self, temperature: float | None) -> Nodes:
+        """Return the rows at the nodes of voltage, at one temperature [degC]; cached."""
         problem = self.problem
         if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
             temperature = None
-        if temperature not in self._laid_out:
-            self._laid_out[temperature] = nodes_of(self.damper, temperature)
-        return self._laid_out[temperature]
+        if temperature not in self._nodes_by_temperature:
+            self._nodes_by_temperature[temperature] = nodes_of(self.damper, temperature)
+        return self._nodes_by_temperature[temperature]
 
-    def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
-        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.varying else {}
+    def _node_voltages(self, effect: str) -> dict[str, tuple[float, ...]]:
+        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.per_voltage else {}
 
-    def at(self, place: int) -> Mapping[str, Mapping[str, float]]:
-        """The effects at the voltage of one base row."""
-        node = self.problem.nodes[place]
+    def effects_at(self, base_row: int) -> Mapping[str, Mapping[str, float]]:
+        """Return the effects at the voltage of one base row."""
+        node = self.problem.nodes[base_row]
         return {
             name: {key: value[node] if isinstance(value, tuple) else value for key, value in values.items()}
             for name, values in self.effects.items()

@@ -1,27 +1,33 @@
+"""The stage from records to a verdict."""
+
 from __future__ import annotations
 
+import re
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
-from campaign import coloured, damper_of, sine, sines, waveform
-from whole_diagnosis import all_but, diagnosed
+from synthetic import TWO, all_but, coloured, damper_of, diagnosed, sine, sines, waveform
 
-from pzd.artefacts import Diagnosed, Rig, base_of
+from pzd.artefacts import Diagnosed, Rig, Value, base_of
 from pzd.damper.compose import respond
+from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import check_residual
-from pzd.diagnosis.data import TRAINING, UNTOUCHED, VALIDATION, prepare, split
-from pzd.diagnosis.fit.prediction import expected
+from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import check_residual
+from pzd.diagnosis.search.acceptance import Selection
+from pzd.diagnosis.stage import parameters_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
 
-TWO = (0.0, 150.0)
 NEIGHBOURS = ("preload_offset", "asymmetry", "gas_spring")
 """An offset of the force, and what is nearest to one."""
 
@@ -41,7 +47,7 @@ def road(damper: Damper, rng: np.random.Generator, voltage: float, displacement_
     return Record(f"road{voltage:g}", None, fine[keep], seen, v[keep], a[keep], measured, U)
 
 
-def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none(rng: np.random.Generator) -> None:
+def test_a_complete_damper_is_unchanged_with_the_verdict_none(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO), rng, TWO, jitter=0.02, cycles=5)
     found = diagnosed(records)
     assert found.diagnosis.verdict == "none"
@@ -75,7 +81,7 @@ def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect(rng:
     ],
     ids=["an offset among few", "an offset", "an orifice"],
 )
-def test_a_missing_effect_is_named_and_told_where_it_acts(
+def test_a_missing_effect_is_named_and_located(
     rng: np.random.Generator, effects: dict[str, dict[str, float]], place: str, forbid: tuple[str, ...]
 ) -> None:
     found = diagnosed(sines(damper_of(TWO, **effects), rng, TWO), forbid=forbid)
@@ -89,7 +95,7 @@ def test_a_missing_effect_is_named_and_told_where_it_acts(
 
 
 @pytest.mark.ci
-def test_a_misfit_at_one_voltage_is_told_there(rng: np.random.Generator) -> None:
+def test_a_misfit_at_one_voltage_is_located_there(rng: np.random.Generator) -> None:
     records = tuple(
         sine(damper_of(asymmetry={"alpha": 0.15 if U == 150.0 else 0.0}), U, f, 0.03, rng)
         for U in TWO
@@ -146,11 +152,11 @@ def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Ge
     parts = split(prepared, None, 2.0)
     whole = [int(roles[0]) for roles in parts.roles]
     assert all(np.all(roles == role) for roles, role in zip(parts.roles, whole, strict=True))
-    assert [whole.count(role) for role in (TRAINING, VALIDATION, UNTOUCHED)] == [8, 4, 4]
+    assert [whole.count(role) for role in (TRAINING, VALIDATION, HELD_OUT)] == [8, 4, 4]
     kinds = [
         (round(p.cycles.frequency, 2), round(float(np.ptp(p.record.displacement)), 3)) for p in prepared if p.cycles
     ]
-    for role in (TRAINING, VALIDATION, UNTOUCHED):
+    for role in (TRAINING, VALIDATION, HELD_OUT):
         # The rig's hardest test is always fitted, so one kind may be missing elsewhere.
         kept = len({kind for kind, given in zip(kinds, whole, strict=True) if given == role})
         assert kept >= (4 if role == TRAINING else 3)
@@ -173,7 +179,7 @@ def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap(rng: np.
         (prepared,) = prepare([record])
         everything = np.ones(prepared.record.time.size, dtype=np.bool_)
         judged = check_residual(
-            expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
+            predict(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
         )
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share
@@ -201,3 +207,88 @@ def test_cleaned_displacement_keeps_the_corners_of_a_triangle(rng: np.random.Gen
     error = prepared.record.displacement - true.displacement
     assert prepared.cycles is not None
     assert np.sqrt(np.mean(error**2)) < 3e-5
+
+
+# --- Mains hum is no gap of the damper, and hides none
+
+
+def humming(damper: Damper, rng: np.random.Generator) -> tuple[Record, ...]:
+    """Sines of two frequencies with hum of 2 % of the softest test's peak, near a harmonic of the motion."""
+    records = sines(damper, rng, TWO, jitter=0.005, cycles=8)
+    amplitude = 0.02 * min(float(np.max(np.abs(record.force))) for record in records)
+    waves = [amplitude * np.sin(2.0 * np.pi * 60.007 * record.time + rng.uniform(0.0, 6.0)) for record in records]
+    return tuple(replace(r, force=r.force + wave) for r, wave in zip(records, waves, strict=True))
+
+
+def test_hum_alone_is_no_gap_and_is_reported(rng: np.random.Generator) -> None:
+    found = diagnosed(humming(damper_of(TWO), rng), forbid=all_but("preload_offset", "orifice_quadratic")).diagnosis
+    assert found.verdict == "none"
+    assert "mains hum of up to" in found.reason
+    assert "is taken for no gap" in found.reason
+
+
+@pytest.mark.ci
+def test_an_effect_is_named_through_the_hum(rng: np.random.Generator) -> None:
+    found = diagnosed(humming(damper_of(TWO, orifice_quadratic={"q": 4000.0}), rng)).diagnosis
+    assert (found.verdict, found.effects) == ("named", ("orifice_quadratic",))
+    q = found.parameters["orifice_quadratic"]["q"].value
+    assert q == pytest.approx(4000.0, rel=0.05)
+
+
+@pytest.mark.ci
+def test_without_hum_none_is_reported(rng: np.random.Generator) -> None:
+    records = sines(damper_of(TWO), rng, TWO, jitter=0.005, cycles=8)
+    assert "hum" not in diagnosed(records, forbid=all_but("preload_offset")).diagnosis.reason
+
+
+# --- An effect too faint to show in the gap as a whole
+
+
+def test_a_name_never_rests_on_a_gap_of_nothing(rng: np.random.Generator) -> None:
+    """Two cycles know too little of noise to show any gap; the orifice is found in its own direction all the same."""
+    damper = damper_of((0.0,), orifice_quadratic={"q": 8000.0})
+    record = sine(damper, 0.0, 1.0, 0.015, rng, noise=0.007, colour=0.0, cycles=2, rate=500.0)
+    told = diagnosed((record,)).diagnosis
+    assert told.effects == ("orifice_quadratic",)
+    assert "falls from 0 %" not in told.reason
+    moved = re.search(r"moves the force by ([0-9.]+) % of peak", told.reason)
+    assert moved is not None
+    assert 0.25 <= float(moved[1]) < 5.0
+
+
+# --- Units of effect parameters under another control signal
+
+
+CONTROLS = [(Control(), "V"), (Control("current", "A"), "A")]
+
+
+@pytest.mark.parametrize(("control", "unit"), CONTROLS)
+def test_a_play_is_found_in_the_unit_of_the_control_and_an_orifice_in_its_own(
+    control: Control, unit: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damper = damper_of((0.0, 150.0)).with_effect("piezo_hysteresis", {"r": 5.0})
+    damper = damper.with_effect("orifice_quadratic", {"q": 900.0})
+    names = {"piezo_hysteresis": 5.0, "orifice_quadratic": 900.0}
+    unknowns: list[Any] = [
+        SimpleNamespace(effect=name, parameter=library()[name].parameters[0], value_in=lambda _, value=value: value)
+        for name, value in names.items()
+    ]
+    monkeypatch.setattr("pzd.diagnosis.stage.standard_errors", lambda _: (0.1, 10.0))
+    selection = cast("Selection", SimpleNamespace(fitted=SimpleNamespace(damper=damper, unknowns=unknowns)))
+    found = parameters_of(selection, control)
+    assert (found["piezo_hysteresis"]["r"].value, found["piezo_hysteresis"]["r"].unit) == (5.0, unit)
+    assert found["orifice_quadratic"]["q"].unit == "N s2/m2"
+
+
+@pytest.mark.parametrize(("control", "unit"), CONTROLS)
+def test_a_play_that_was_edited_by_hand_is_read_in_the_unit_of_the_control(
+    control: Control, unit: str, tmp_path: Path
+) -> None:
+    name, plain = "piezo_hysteresis", damper_of((0.0, 150.0))
+    made = Diagnosed.undiagnosed(plain.with_effect(name, {"r": 6.0}), plain)
+    found = {name: {"r": Value(value=5.0, low95=4.0, high95=6.0, unit=unit)}}
+    replace(made, diagnosis=made.diagnosis.model_copy(update={"effects": (name,), "parameters": found})).write(
+        tmp_path, control
+    )
+    told = Diagnosed.read(tmp_path, control).diagnosis.parameters[name]["r"]
+    assert (told.value, told.low95, told.unit) == (6.0, None, unit)

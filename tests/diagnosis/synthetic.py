@@ -1,16 +1,30 @@
-"""Synthetic rig records of a known damper, made from the continuous waveform."""
+"""Synthetic rig records of a known damper, made from the continuous waveform, and their diagnosis."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from pzd.artefacts import Diagnosed, Rig
 from pzd.damper.compose import respond
+from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.data import prepare, split
+from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.stage import diagnose
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import NuisanceConfig
 
+TWO = (0.0, 150.0)
+"""The voltages of most tests: the least and the largest friction."""
 FINER = 16
 TABLE_2 = {0.0: (301.0, 2720.0, 199e3), 50.0: (356.0, 3300.0, 358e3), 100.0: (796.0, 3040.0, 375e3),
            150.0: (1325.0, 2560.0, 423e3)}  # fmt: skip
@@ -84,3 +98,29 @@ def sines(
         for U in voltages
         for f, x in tests
     )  # fmt: skip
+
+
+def campaign_of(records: Iterable[Record]) -> Campaign:
+    prepared = prepare(tuple(records))
+    return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
+
+
+STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
+"""A rig whose files say nothing of the stand."""
+
+
+def all_but(*effects: str) -> tuple[str, ...]:
+    """What to forbid where the claim needs few candidates: most of a diagnosis is their fits."""
+    return tuple(sorted(set(library()) - set(effects)))
+
+
+def problem_of(records: Iterable[Record]) -> Problem:
+    """The least-squares problem of tests at one voltage, weighed by what the baseline leaves."""
+    return evidence_of(campaign_of(records), damper_of((0.0,))).whole
+
+
+def diagnosed(records: Iterable[Record], jobs: int = 2, **config: object) -> Diagnosed:
+    """The diagnosis of records of one setting; `config` is its block."""
+    rig = Rig(tuple(records), ())
+    settings = DiagnoseConfig.model_validate(config)
+    return diagnose(settings, IdentifyConfig(), STAND, rig, identify(IdentifyConfig(), rig, 1), Control(), None, jobs)

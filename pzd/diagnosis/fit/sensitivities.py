@@ -1,0 +1,329 @@
+"""Simulated forces, residuals and their Jacobian at a point of the search."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compiled.laws import ELEMENT
+from pzd.damper.compiled.rows import rows_along
+from pzd.damper.compose import (
+    constant_rows,
+    constant_value,
+    drive_row_of,
+    element_rows,
+    forces_beside,
+    integrated_sensitivities,
+    parallel_rows,
+    sensors_of,
+)
+from pzd.damper.confounders import known
+from pzd.damper.material import material_factors
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
+from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
+from pzd.record import Array
+
+# --- Parameters as the kernels take them
+
+
+@dataclass(frozen=True, eq=False)
+class KernelInputs:
+    """Parameters of a damper as the kernels take them, along the motion of one observation."""
+
+    at_nodes: Array
+    """(k, r) parameter rows of the element at the nodes; without nodes (1, r), or (m, r) along the motion."""
+    parallel: Array | None
+    """(1, b) or (m, b) rows of the parallel forces; None without any."""
+    sensors: Mapping[str, Mapping[str, float]]
+    """Parameters of the effects of the sensor, by effect and name."""
+    displacement_zero: float
+    """Zero of the displacement [m]."""
+    nodes: Array | None = None
+    """(k,) voltages [V]; None without nodes."""
+    effective_voltage: Array | None = None
+    """(m,) effective voltage [V], at which the rows are interpolated between the nodes."""
+
+    @cached_property
+    def rows(self) -> Array:
+        """(1, r) or (m, r) parameter rows of the element."""
+        return self._interpolated(self.at_nodes)
+
+    def _interpolated(self, at_nodes: Array) -> Array:
+        if self.nodes is None or self.effective_voltage is None:
+            return at_nodes
+        return rows_along(self.nodes, at_nodes, self.effective_voltage)
+
+    def difference_to(self, other: KernelInputs) -> Array:
+        """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
+        mine, others = (
+            (self.at_nodes, other.at_nodes)
+            if self.effective_voltage is other.effective_voltage
+            else (self.rows, other.rows)
+        )
+        shape = np.broadcast_shapes(mine.shape, others.shape)
+        return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
+
+    def along_motion(self, change: Array) -> Array:
+        """Interpolate values given at the nodes to (1, c) or (m, c) along the motion."""
+        return self._interpolated(change) if self.nodes is not None and len(change) == self.nodes.size else change
+
+    def parallel_force(self, o: WeightedRecord) -> Array:
+        """Compute the (m,) parallel force [N]; (1,) a zero without any."""
+        return (
+            np.zeros(1)
+            if self.parallel is None
+            else forces_beside(o.motion.about(self.displacement_zero), self.parallel)
+        )
+
+
+def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
+    """Evaluate the parameters of a point along the motion of an observation."""
+    return _at_constant_voltage(point, o) if o.base_row >= 0 else _at_moving_voltage(point, o)
+
+
+def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
+    friction, damping, stiffness = point.base[o.base_row]
+    effects = point.effects_at(o.base_row)
+    rows, parallel = constant_rows(friction, damping, stiffness, effects)
+    places = {name: known()[name].place for name in effects}
+    acting = {name: values for name, values in effects.items() if places[name] == "material"}
+    if acting:
+        given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
+        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference_temperature)
+        rows = np.repeat(rows, len(factors), axis=0)
+        rows[:, : len(ELEMENT)] *= factors
+    sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
+    return KernelInputs(rows, parallel, sensors, point.displacement_zero)
+
+
+def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
+    damper, temperature = point.damper, constant_value(o.motion.temperature)
+    effective = o.effective_voltage(drive_row_of(damper).tobytes())
+    parallel, sensors = parallel_rows(damper, effective), sensors_of(damper)
+    if temperature is not None and temperature.size > 1:
+        return KernelInputs(element_rows(damper, effective, temperature), parallel, sensors, point.displacement_zero)
+    nodes = point.nodes(None if temperature is None else float(temperature[0]))
+    return KernelInputs(nodes.rows, parallel, sensors, point.displacement_zero, nodes.voltages, effective)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchDirections:
+    """Derivatives of the kernel inputs along some directions of the search, for one observation."""
+
+    centre: KernelInputs
+    pairs: Sequence[tuple[KernelInputs, KernelInputs, float]]
+    """On each direction a point before and one behind, and their distance."""
+    changed: NDArray[np.int64]
+    """(c,) columns of the rows that a direction changes."""
+    derivatives: Array
+    """(1, d, c) or (m, d, c) derivatives of these columns by each direction."""
+
+
+def search_directions(
+    point: Point, neighbours: Sequence[tuple[Point, Point, float]], o: WeightedRecord
+) -> SearchDirections:
+    """Difference the kernel inputs along some directions of the search.
+
+    Parameters
+    ----------
+    point : at which the derivatives are taken
+    neighbours : on each direction a point before and one behind, and their distance
+    o : the observation
+    """
+    here = kernel_inputs(point, o)
+    pairs = [(kernel_inputs(a, o), kernel_inputs(b, o), width) for a, b, width in neighbours]
+    changes = [before.difference_to(after) / width for before, after, width in pairs]
+    moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
+    along = [here.along_motion(change[:, moved]) for change in changes]
+    return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
+
+
+def independent_of_temperature(point: Point) -> bool:
+    """Whether observations of one base row share their kernel inputs: nothing depends on the temperature of each."""
+    return all(known()[name].place != "material" for name in point.effects)
+
+
+def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
+    """Compute the force at the compared samples of an observation and its derivatives along some directions.
+
+    The dependence of the kernel inputs on the parameters is differenced; the path integrates the derivatives exactly.
+
+    Parameters
+    ----------
+    given : directions along the motion of this observation
+    o : the observation
+    budget : counts what is simulated
+
+    Returns
+    -------
+    (n,) force [N], (n, d) slopes [N]
+    """
+    budget.add(o.motion.time.size * (1 + len(given.pairs)))
+    parallel = given.centre.parallel_force(o)
+    changes = [_parallel_force_derivative(pair, o) for pair in given.pairs]
+    initial_slopes = np.array([-change[0] for change in changes])
+    force, slopes = integrated_sensitivities(
+        given.centre.rows,
+        given.changed,
+        given.derivatives,
+        o.motion,
+        o.steps,
+        o.initial_force - float(parallel[0]),
+        initial_slopes,
+        SIMULATION_TOLERANCE,
+    )
+    force = force + parallel
+    for j, change in enumerate(changes):
+        slopes[:, j] += change
+    if not given.centre.sensors:
+        return o.at_compared(force), o.at_compared(slopes)
+    shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
+    for j, (before, after, width) in enumerate(given.pairs):
+        if before.sensors != after.sensors:
+            shown[:, 1 + j] += (
+                o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
+            ) / width
+    compared = o.at_compared(shown)
+    return compared[:, 0], compared[:, 1:]
+
+
+def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
+    """Compute the (m,) or (1,) derivative of the parallel force along a direction [N]."""
+    before, after, width = pair
+    if before.displacement_zero == after.displacement_zero and _equal_rows(before.parallel, after.parallel):
+        return np.zeros(1)
+    return (after.parallel_force(o) - before.parallel_force(o)) / width
+
+
+def _equal_rows(one: Array | None, other: Array | None) -> bool:
+    return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
+
+
+# --- Residuals and their Jacobian
+
+
+STEP = 1e-4
+"""Step of a search variable to either side, over which the kernel inputs and the parallel force are differenced.
+
+Reason: far above rounding, and so short that a branch begins to slip at the same sample on either side; the path of the
+element, whose own errors a longer step would have to exceed, is not differenced."""
+
+
+@dataclass(frozen=True, eq=False)
+class BlockJacobian:
+    """Jacobian by observations, each with the variables that move it alone: a test has one voltage of many."""
+
+    free: int
+    """Number of variables that the search moves."""
+    blocks: tuple[tuple[tuple[int, ...], Array], ...]
+    """Columns of the variables and (w_o, columns) derivatives of each observation."""
+
+    def dense(self, columns: Sequence[int] | None = None) -> Array:
+        """Return the (w, columns) derivatives by some variables, or by all; zero where there is no dependence."""
+        wanted = range(self.free) if columns is None else columns
+        place = {j: i for i, j in enumerate(wanted)}
+        found = np.zeros((sum(len(block) for _, block in self.blocks), len(place)))
+        begin = 0
+        for own, block in self.blocks:
+            here = [i for i, j in enumerate(own) if j in place]
+            found[begin : begin + len(block), [place[own[i]] for i in here]] = block[:, here]
+            begin += len(block)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Residuals at a point of the search, and their Jacobian."""
+
+    residuals: tuple[Array, ...]
+    """(w_o,) per observation, in units of noise."""
+    simulated: tuple[Array, ...]
+    """(n,) per observation, force at the compared samples [N]."""
+    jacobian: BlockJacobian
+    """Of all residuals by the search variables."""
+
+    @property
+    def stacked(self) -> Array:
+        """(w,) all residuals."""
+        return np.concatenate(self.residuals)
+
+
+def linearise(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    x: Array,
+    limits: tuple[Array, Array],
+    wanted: Sequence[int] | None = None,
+) -> Linearisation:
+    """Compute residuals and Jacobian at a point: together they cost little more than the residuals alone.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    unknowns : of the effects
+    x : (3 b + e,) point in the units of the search
+    limits : (free,) least and largest values of the variables that the search moves
+    wanted : columns to compute, the others being zero; all where none are given
+    """
+    residuals, forces, blocks = [], [], []
+    for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
+        standardised = o.standardised(np.column_stack([o.measured - force, -slopes]))
+        residuals.append(standardised[:, 0].copy())
+        forces.append(force)
+        blocks.append((columns, standardised[:, 1:].copy()))
+    return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
+
+
+def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockJacobian:
+    """Compute the Jacobian of the force at the compared samples [N] by all variables; see `linearise`."""
+    limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
+    found = _sensitivities_at(problem, unknowns, x, limits, None)
+    return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+
+
+def _sensitivities_at(
+    problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
+) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
+    """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
+    low, high = limits
+    free = low.size
+    point, below, above = (
+        problem.point(x, unknowns),
+        np.maximum(x[:free] - STEP, low),
+        np.minimum(x[:free] + STEP, high),
+    )
+
+    def moved(j: int, value: float) -> Point:
+        return problem.point(np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns)
+
+    columns_wanted = range(free) if wanted is None else wanted
+    neighbours = {j: (moved(j, below[j]), moved(j, above[j]), float(above[j] - below[j])) for j in columns_wanted}
+    # Observations of one base row share their directions, unless a material effect goes by the temperature of each.
+    shared, cached = independent_of_temperature(point), dict[int, SearchDirections]()
+    for o in problem.observations:
+        columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)
+        if o.base_row not in cached or o.base_row < 0 or not shared:
+            cached[o.base_row] = search_directions(point, [neighbours[j] for j in columns], o)
+        yield o, columns, *sensitivities(cached[o.base_row], o, problem.budget)
+
+
+def active_columns(problem: Problem, unknowns: Sequence[Unknown], o: WeightedRecord, free: int) -> list[int]:
+    """Return which of the first `free` variables move an observation: a test depends on its own voltage alone.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    unknowns : of the effects
+    o : the observation
+    free : number of variables that the search moves
+    """
+    rows = 3 * len(problem.base)
+    own = range(3 * o.base_row, 3 * o.base_row + 3) if o.base_row >= 0 else range(rows)
+    effects = [
+        j for j, u in enumerate(unknowns) if u.node is None or o.base_row < 0 or u.node == problem.nodes[o.base_row]
+    ]
+    return [*own, *(rows + j for j in effects if rows + j < free)]

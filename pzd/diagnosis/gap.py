@@ -1,0 +1,432 @@
+"""The gap between simulation and measurement: residual of a record, size, probability by noise, and where it lies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.artefacts import Gap, Region
+from pzd.diagnosis.data import PreparedRecord, Split
+from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
+from pzd.diagnosis.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
+from pzd.record import Array, Mask
+from pzd.signals.harmonics import hum
+from pzd.signals.jumps import jumps_in_cycles, jumps_in_samples, within_a_sample
+from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend, pooled
+from pzd.signals.noise import PureError, fit_smooth_residual, harmonics_of, pure_error, repeatable_power
+from pzd.signals.nuisance import NuisanceConfig, nuisance
+from pzd.signals.smoothing import reversals
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualCheck:
+    """Residual of one record against a damper, over the checked samples, with its noise."""
+
+    prepared: PreparedRecord
+    wanted: Mask
+    """(n,) checked samples."""
+    residual: Array
+    """(n,) measured less predicted force [N]."""
+    nuisances: Array
+    """(n,) part of it explained by offset, gain, delay and mains of the test, and by chance near jumps [N]."""
+    variance: float
+    """Of one sample by noise [N^2]."""
+    power: float
+    """Mean square above the noise of what repeats or is smooth [N^2]; about zero without a gap."""
+    probability: dict[str, Array]
+    """Probability by noise alone, by kind of test (`harmonics`, `trend`, `smooth`)."""
+    error: PureError | None
+    """Harmonics and noise of the average cycle, where cycles repeat."""
+    folded: Array | None
+    """(cycles, points) residual less nuisances, where cycles repeat [N]."""
+    hum: float
+    """Amplitude of the mains among the nuisances [N]; 0 where no line stands out."""
+    explained: Array | None
+    """(n,) squared smooth part of the residual less its share of noise, where nothing repeats [N^2]."""
+
+    @property
+    def cleared(self) -> Array:
+        """(n,) residual less nuisances [N]."""
+        return self.residual - self.nuisances
+
+    @property
+    def predicted(self) -> Array:
+        """(n,) force that the damper gives [N]."""
+        return self.prepared.record.force - self.residual
+
+    @property
+    def peak(self) -> float:
+        """Peak force of the record [N]."""
+        return float(np.max(np.abs(self.prepared.record.force)))
+
+
+def check_residual(
+    given: PredictedForce, prepared: PreparedRecord, wanted: Mask, config: NuisanceConfig
+) -> ResidualCheck:
+    """Compare a record with its predicted force, over the wanted samples past the warm-up."""
+    record = prepared.record
+    predicted, residual = given.force, record.force - given.force
+    mask = wanted & comparable_samples(prepared)
+    mains = _mains(prepared, residual, mask)
+    without = residual - mains
+    variance = _difference_variance(prepared, without, mask)
+    calm = jump_bend(prepared, predicted) == 0.0
+    size, timing = np.zeros(residual.size), np.zeros(residual.size)
+    size[mask], timing[mask] = nuisance(
+        without[mask], predicted[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask
+    )
+    near_jumps = _nuisance_near_jumps(record.force - mains, predicted, size, timing)
+    explained = mains + np.where(mask & ~calm, near_jumps, size + timing)
+    folded = _folded(prepared, residual - explained, mask)
+    if folded is not None:
+        found = _check_cycles(prepared, mask, residual, explained, folded, given.displacement_variance)
+    else:
+        found = _check_samples(prepared, mask, residual, explained, predicted)
+    return replace(found, hum=float(np.max(np.abs(mains))))
+
+
+def _mains(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array:
+    """Estimate the (n,) mains hum in the force [N]; it nearly repeats from cycle to cycle, as a gap does."""
+    record, run = prepared.record, prepared.cycles
+    peak = float(np.max(np.abs(record.force)))
+    return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
+
+
+def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
+    """Compute (n,) how far the force bends near a jump [N]; 0 elsewhere."""
+    record, run = prepared.record, prepared.cycles
+    if run is None:
+        return jumps_in_samples(record.force, predicted, len(reversals(record.displacement)))
+    return jumps_in_cycles(run, record.time, record.force)
+
+
+def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array) -> Array:
+    """Compute the (n,) part explained by a test and chance near a jump [N]: with the timing where less remains with it.
+
+    Parameters
+    ----------
+    force, predicted : (n,) [N]
+    size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
+    """
+    found = [part + within_a_sample(force - part, predicted) for part in (size, size + timing)]
+    left = [np.abs(force - predicted - part) for part in found]
+    return np.where(left[0] <= left[1], *found)
+
+
+def _check_cycles(
+    prepared: PreparedRecord,
+    mask: Mask,
+    residual: Array,
+    nuisances: Array,
+    folded: Array,
+    by_displacement: Array | float,
+) -> ResidualCheck:
+    error = replace(pure_error(folded), shared=by_displacement)
+    trend = by_trend(folded)
+    probability = {"harmonics": by_harmonics(error)}
+    if trend is not None:
+        probability["trend"] = np.array([trend])
+    power = float(repeatable_power(error).sum())
+    if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
+        power += _trend_power(folded, error)
+    return ResidualCheck(
+        prepared, mask, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
+    )
+
+
+def _check_samples(
+    prepared: PreparedRecord, mask: Mask, residual: Array, nuisances: Array, predicted: Array
+) -> ResidualCheck:
+    fit = fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
+    left = (residual - nuisances)[mask] - fit.explained
+    variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
+    explained = np.zeros(residual.size)
+    explained[mask] = fit.explained**2 - fit.spread
+    power = float(np.mean(explained[mask]))
+    probability = {"smooth": np.array([fit.probability])}
+    return ResidualCheck(prepared, mask, residual, nuisances, variance, power, probability, None, None, 0.0, explained)
+
+
+def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | None:
+    """Return the wanted whole cycles of the residual, one row each; None with fewer than two."""
+    run = prepared.cycles
+    if run is None:
+        return None
+    time = prepared.record.time
+    whole = run.whole(time, mask)
+    return run.fold(time, residual)[whole] if len(whole) >= 2 else None
+
+
+def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
+    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
+    folded = _folded(prepared, residual, mask)
+    if folded is not None:
+        return float(np.mean(np.diff(folded, axis=0) ** 2) / 2.0)
+    return float(np.mean(np.diff(residual[mask]) ** 2) / 2.0)
+
+
+def _trend_power(folded: Array, error: PureError) -> float:
+    """Compute the mean square of a steady change from cycle to cycle, less its share of noise [N^2]."""
+    count, points = folded.shape
+    if count < TREND_CYCLES:
+        return 0.0
+    last = min(TREND_HARMONICS, harmonics_of(points))
+    order = np.arange(count) - (count - 1) / 2.0
+    coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
+    slopes = np.abs(order @ coefficients / (order @ order)) ** 2 - error.single[: last + 1] / (order @ order)
+    return float((slopes[0] + 2.0 * slopes[1:].sum()) * np.mean(order**2))
+
+
+# --- Size of the gap and its probability by noise
+
+
+BLOCKS = 8
+"""Blocks over which the scatter of the gap is estimated in a record that does not repeat."""
+
+
+def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
+    """Pool criterion (4) over the held-out samples, with noise floor and standard error; `after` equals `before`.
+
+    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `noise_floor`;
+    standard error of the ratio over cycles or blocks
+                                           Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
+    """
+    errors = np.concatenate([_by_block(j, j.residual**2) for j in held_out])
+    forces = np.concatenate([_by_block(j, j.prepared.record.force**2) for j in held_out])
+    total = float(forces.sum())
+    criterion = float(errors.sum()) / total
+    count = errors.size
+    scatter = float(np.sum((errors - criterion * forces) ** 2)) * count / max(count - 1, 1)
+    return Gap(
+        before=criterion,
+        after=criterion,
+        noise_floor=min(sum(noise_floor(j) for j in held_out) / total, criterion),  # at most, but for rounding
+        standard_error=float(np.sqrt(scatter)) / total,
+        held_out=split.held_out,
+        hold_out=split.hold_out,
+    )
+
+
+def noise_floor(check: ResidualCheck) -> float:
+    """Compute what noise and the test's own nuisances leave of one record, summed over the checked samples [N^2].
+
+    The nuisances count with what they take away, at most: near a jump they move the residual without making it smaller.
+    Noise is the scatter between cycles or about a smooth residual, at most what the nuisances leave. So noise never
+    exceeds the gap that it is part of.
+
+    Equation: sum min(s^2, mean c^2) + min(sum n^2, sum r^2 - sum c^2), c = r - n, n the nuisances
+    """
+    residual, cleared = check.residual[check.wanted], check.cleared[check.wanted]
+    nuisances = check.nuisances[check.wanted]
+    before, after = float(residual @ residual), float(cleared @ cleared)
+    taken = min(max(before - after, 0.0), float(nuisances @ nuisances))
+    return min(check.variance * residual.size, after, before) + taken
+
+
+def _by_block(check: ResidualCheck, values: Array) -> Array:
+    """Sum (n,) values over the checked samples of each cycle, or of each block."""
+    kept = values[check.wanted]
+    run = check.prepared.cycles
+    if run is None:
+        return np.array([part.sum() for part in np.array_split(kept, min(BLOCKS, max(kept.size, 1)))])
+    number = run.number(check.prepared.record.time)[check.wanted]
+    return np.array([kept[number == j].sum() for j in np.unique(number)])
+
+
+def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
+    """Compute the probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
+    kinds = {kind for c in checks for kind in c.probability}
+    return min(1.0, *(len(kinds) * pooled([c.probability[k] for c in checks if k in c.probability]) for k in kinds))
+
+
+def visible_gap(checks: Sequence[ResidualCheck]) -> float:
+    """Compute the r.m.s. gap above the noise as a share of each record's peak force, pooled over the samples."""
+    return _pooled(checks, [c.power / c.peak**2 for c in checks])
+
+
+def gap_in_force(checks: Sequence[ResidualCheck]) -> float:
+    """Compute the r.m.s. gap above the noise [N], pooled over the samples: the tests of large force count most."""
+    return _pooled(checks, [c.power for c in checks])
+
+
+def _pooled(checks: Sequence[ResidualCheck], squares: Sequence[float]) -> float:
+    samples = np.array([np.count_nonzero(c.wanted) for c in checks], dtype=np.float64)
+    return float(np.sqrt(max(float(samples @ np.array(squares) / samples.sum()), 0.0)))
+
+
+# --- Where the gap lies
+
+Labels = NDArray[np.str_]
+
+DENSER = 1.25
+"""Ratio of the shares of gap and samples from which a region is reported."""
+LEAST_SHARE = 0.15
+"""Share of the gap from which a region is reported."""
+LEAST_SHARE_OF_THIRD = 0.5
+"""Share of the gap from which a third of the run is reported: single cycles are noisy."""
+MOST_REGIONS = 10
+"""Regions reported, at most: what fits in one table of the report."""
+
+
+def regions(checks: Sequence[ResidualCheck], unit: str, displacement_zero: float = 0.0) -> tuple[Region, ...]:
+    """Find the regions in which the gap is denser than elsewhere, most telling first.
+
+    Parameters
+    ----------
+    checks : records against the damper
+    unit : of the control signal
+    displacement_zero : recorded displacement where that of `checks` is zero [m]
+
+    Returns
+    -------
+    regions in words with their share of the gap; empty where there is no gap above the noise
+    """
+    points = [_points(check) for check in checks]
+    density, weight = (np.concatenate([p[name] for p in points]) for name in ("density", "weight"))
+    if float(density.sum()) <= 0.0:
+        return ()
+    speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
+    stroke = max(float(np.ptp(p["displacement"])) for p in points)
+    labels: dict[str, list[Labels]] = {}
+    for check, p in zip(checks, points, strict=True):
+        for axis, words in _labels(check, p, speed, stroke, unit, displacement_zero).items():
+            labels.setdefault(axis, []).append(words)
+    found: list[tuple[float, Region]] = []
+    for parts in labels.values():
+        if len(parts) == len(checks):  # an axis that some test lacks, such as temperature, divides no whole gap
+            found += _denser(np.concatenate(parts), density, weight)
+    found += _frequencies(checks)
+    found += _thirds(checks)
+    found.sort(key=lambda item: -item[0])
+    return tuple(region for _, region in found[:MOST_REGIONS]) or (Region(region="everywhere alike", share_of_gap=1.0),)
+
+
+def _points(check: ResidualCheck) -> dict[str, Array]:
+    """Return motion, density of the gap [N^2] and number of samples: along the average cycle, or at every sample.
+
+    The density is the squared residual less its share of noise; it sums to the gap.
+    """
+    record, run = check.prepared.record, check.prepared.cycles
+    if check.folded is None or run is None:
+        keep = check.wanted
+        names = ("velocity", "displacement", "acceleration")
+        motion = {name: getattr(record, name)[keep] for name in names}
+        density = (check.cleared**2 - check.variance if check.explained is None else check.explained)[keep]
+        voltage = record.voltage[keep] if record.voltage is not None else np.full(density.size, np.nan)
+        return {**motion, "density": density, "weight": np.ones(density.size), "voltage": voltage}
+    count = check.folded.shape[0]
+    mean = check.folded.mean(axis=0)
+    motion = {
+        "velocity": run.mean(record.time, record.velocity),
+        "displacement": run.mean(record.time, record.displacement),
+        "acceleration": run.mean(record.time, record.acceleration),
+    }
+    voltage = np.full(mean.size, record.median_voltage() if record.voltage is not None else np.nan)
+    density = count * (mean**2 - check.variance / count)
+    return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}
+
+
+def _labels(
+    check: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, displacement_zero: float
+) -> dict[str, Labels]:
+    """Return by axis the (n,) region in words that each point belongs to; positions as recorded."""
+    v, x, a = p["velocity"], p["displacement"], p["acceleration"]
+    distance = 0.25 * stroke  # edges to two figures of it
+    sides = np.round([displacement_zero - distance, displacement_zero + distance], 1 - math.floor(math.log10(distance)))
+    fast = _bands(np.abs(v), _rounded(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
+    found = {
+        "velocity": fast,
+        "position": _bands(x + displacement_zero, sides, "x", "m"),
+        "direction": np.where(v >= 0.0, "rebound (v > 0)", "compression (v < 0)"),
+        "phase": np.where(v * a >= 0.0, "speeding up", "slowing down"),
+    }
+    if np.all(np.isfinite(p["voltage"])):
+        words = _voltages(p["voltage"], unit)
+        found["voltage"] = words
+        found["velocity and voltage"] = np.char.add(np.char.add(fast, ", "), words)
+    temperature = check.prepared.record.median_temperature()
+    if temperature is not None:
+        found["temperature"] = np.full(v.size, f"{temperature:.0f} degC")
+    return found
+
+
+def _voltages(voltage: Array, unit: str) -> Labels:
+    """Label voltages to three figures; a moving one in fifths of its range."""
+    span = float(np.ptp(voltage))
+    if span <= 0.02 * float(np.max(np.abs(voltage))):
+        return np.full(voltage.size, f"{float(np.median(voltage)):.3g} {unit}")
+    return _bands(voltage, _rounded(voltage.min() + span * np.array([0.2, 0.4, 0.6, 0.8])), "moving control", unit)
+
+
+def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
+    numbers = [f"{edge:.6g}" for edge in edges]
+    words = [f"{name} < {numbers[0]} {unit}"]
+    words += [f"{low} < {name} < {high} {unit}" for low, high in pairwise(numbers)]
+    words.append(f"{name} > {numbers[-1]} {unit}")
+    return np.array(words)[np.searchsorted(edges, values)]
+
+
+def _rounded(edges: Array) -> Array:
+    """Round edges to two figures, so that the labels state them exactly."""
+    return np.array([float(f"{edge:.2g}") for edge in edges])
+
+
+def _denser(labels: Labels, density: Array, weight: Array) -> list[tuple[float, Region]]:
+    """Return the regions of one axis that hold more of the gap than of the samples, with the difference."""
+    names, index = np.unique(labels, return_inverse=True)
+    if names.size < 2:
+        return []
+    shares = np.bincount(index, density) / density.sum()
+    samples = np.bincount(index, weight) / weight.sum()
+    return _described(zip(names, shares, samples, strict=True))
+
+
+def _described(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, Region]]:
+    return [
+        (share - samples, Region(region=str(name), share_of_gap=float(min(share, 1.0))))
+        for name, share, samples in shares
+        if share >= LEAST_SHARE and share >= DENSER * samples
+    ]
+
+
+def _frequencies(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
+    """Return the octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
+    power: dict[str, float] = {}
+    for check in checks:
+        if check.error is None or check.prepared.cycles is None:
+            continue
+        words = [_octave(h * check.prepared.cycles.frequency) for h in range(check.error.mean.size)]
+        samples = float(np.count_nonzero(check.wanted))
+        for word, part in zip(words, repeatable_power(check.error), strict=True):
+            power[word] = power.get(word, 0.0) + samples * float(part)
+    total = sum(power.values())
+    if total <= 0.0 or len(power) < 2:
+        return []
+    return _described((word, part / total, 1.0 / len(power)) for word, part in power.items())
+
+
+def _octave(frequency: float) -> str:
+    if frequency <= 0.0:
+        return "constant offset of the force"
+    octave = int(np.floor(np.log2(frequency) + 1e-9))
+    return f"{2.0**octave:g} to {2.0 ** (octave + 1):g} Hz in the force"
+
+
+def _thirds(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
+    """Return the third of the run in which the gap is larger."""
+    names = ("first third of the run", "middle third of the run", "last third of the run")
+    shares, samples = np.zeros(3), np.zeros(3)
+    for check in checks:
+        kept = np.flatnonzero(check.wanted)
+        for third, part in enumerate(np.array_split(kept, 3)):
+            shares[third] += float(np.sum(check.cleared[part] ** 2)) - part.size * check.variance
+            samples[third] += part.size
+    if shares.sum() <= 0.0:
+        return []
+    found = _described(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
+    return [item for item in found if item[1].share_of_gap >= LEAST_SHARE_OF_THIRD]
