@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, Scatter, SweepConfig, Uniform
 from pzd.quantities import Control
 from pzd.record import Array
@@ -315,9 +316,8 @@ def decisive(results: Results) -> list[str]:
 
 
 def _interval(row: IndexRow) -> str:
-    if row.total_order_low95 is None or row.total_order_high95 is None:
-        return "no interval"
-    return f"{_percent(row.total_order_low95)} to {_percent(row.total_order_high95)}"
+    interval = Estimate.of(row, "total_order").interval
+    return "no interval" if interval is None else " to ".join(map(_percent, interval))
 
 
 def _cards(results: Results, indices: Sequence[IndexRow]) -> tuple[Card, ...]:
@@ -438,8 +438,8 @@ def _tornado(rows: Sequence[IndexRow], measure: str) -> Panel:
     figure, ax = _lines([_short(row.quantity) for row in ordered])
     for place, row in enumerate(ordered):
         ax.barh(place, row.total_order, color=FINAL, height=0.6)
-        if row.total_order_low95 is not None and row.total_order_high95 is not None:
-            ax.plot((row.total_order_low95, row.total_order_high95), (place, place), color=BASELINE, linewidth=1.5)
+        if interval := Estimate.of(row, "total_order").interval:
+            ax.plot(interval, (place, place), color=BASELINE, linewidth=1.5)
     ax.set_xlabel("share of the variance (total order)")
     label = _label(rows[0].combination, rows[0].about)
     return Panel(figure, f"{measure}, {label}", f"Share of the variance of {measure} by quantity.", "")

@@ -19,6 +19,7 @@ from pzd.artefacts import (
     Rig,
     identified_damper,
 )
+from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.knee import knee_damper
 from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
@@ -118,7 +119,7 @@ def test_bleed_knee_and_blow_off_of_each_direction_lie_in_their_intervals(with_a
     }
     outside = []
     for name, expected in truth.items():
-        value, low, high = row.interval(name)
+        value, low, high = Estimate.of(row, name)
         assert value == pytest.approx(expected, rel=0.1)
         outside += [] if low <= expected <= high else [name]
     assert len(outside) <= 2  # twelve intervals of 95 %: three or more fail once in fifty
