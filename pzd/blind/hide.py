@@ -29,7 +29,7 @@ from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Cont
 from pzd.record import Array
 from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
 from pzd.rig.stand.frame import force_in_frame
-from pzd.rig.stand.recording import Taken, take
+from pzd.rig.stand.recording import StandRecord, run_campaign
 from pzd.schema.csvfile import write_columns
 from pzd.schema.validate import write_json
 from pzd.signals.nuisance import NuisanceConfig
@@ -112,7 +112,7 @@ def draw_case(setup: BenchmarkSetup, planned: PlannedCase) -> DrawnCase:
     wanted = {name: float(np.exp(rng.uniform(*np.log(blind.sizes)))) for name in planned.hidden}
     stand = _quiet_stand(setup, campaign, _scattered(setup.stand.damper, blind.base_spread, rng), warms=warms)
     at_rate = stand.model_copy(update={"oversampling": 1})  # sizes need no finer steps
-    baseline = _noise_free(take(at_rate, stand_seed, control=setup.control))
+    baseline = _noise_free(run_campaign(at_rate, stand_seed, control=setup.control))
     form: HiddenForm | None = None
     if planned.kind == "outside":
         form = HiddenForm.drawn(planned.hidden[0], wanted[planned.hidden[0]], baseline, rng)
@@ -120,7 +120,7 @@ def draw_case(setup: BenchmarkSetup, planned: PlannedCase) -> DrawnCase:
     else:
         damper, law = with_effects(stand.damper, wanted, baseline, rng), force_in_frame
     noisy = stand.model_copy(update={"damper": damper, **_sensors(setup, force_noise, rho, displacement_noise)})
-    records = list(take(noisy, stand_seed, control=setup.control, law=law))
+    records = list(run_campaign(noisy, stand_seed, control=setup.control, law=law))
     noise_free = _noise_free(records)
     truth = Truth(
         id=planned.id,
@@ -188,7 +188,7 @@ def _sensors(setup: BenchmarkSetup, share: float, rho: float, displacement_noise
     }
 
 
-def _noise_free(records: Iterable[Taken]) -> list[NoiseFreeRecord]:
+def _noise_free(records: Iterable[StandRecord]) -> list[NoiseFreeRecord]:
     return [NoiseFreeRecord(record.truth, record.true_force, record.force) for record in records]
 
 

@@ -129,7 +129,7 @@ def gap_cut(diagnosed: Diagnosed, noise_free: NoiseFree, *, gains_out: bool = Fa
     records = [noise_free[name] for name in _held_out(diagnosed)]
     before, after = (
         sum(_squares(damper, record, gains_out=gains_out) for record in records)
-        for damper in (diagnosed.plain, diagnosed.damper)
+        for damper in (diagnosed.baseline, diagnosed.damper)
     )
     return 1.0 - after / before
 
@@ -151,7 +151,7 @@ def gap_cut_of_truth(diagnosed: Diagnosed, noise_free: NoiseFree) -> float:
         alike = [other.gain for other in fitted.values() if other.voltage == record.voltage]
         error = float(np.mean(alike or [other.gain for other in fitted.values()])) - 1.0
         after += float(np.sum((error * record.force[warm_up(record.motion.displacement) :]) ** 2))
-        before += _squares(diagnosed.plain, record, gains_out=False)
+        before += _squares(diagnosed.baseline, record, gains_out=False)
     return 1.0 - after / before
 
 

@@ -100,7 +100,7 @@ def blind(
     """Hide effects in virtual rigs, diagnose them, score the verdicts."""
     from pzd.blind.benchmark import Benchmark, Methods, folder_of
     from pzd.blind.summary import write
-    from pzd.parallel.config import Where
+    from pzd.parallel.engines import Where
     from pzd.pipeline.command import opened
 
     output = Output(quiet=quiet, verbose=verbose)
@@ -115,9 +115,7 @@ def blind(
         where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
         benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
         cases = benchmark.run(jobs, afresh=force)
-        tuning, generator = setup.blind.tuning, setup.blind.generator
-        by_campaign = setup.blind.by_campaign
-        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator, by_campaign=by_campaign)
+        lines = write(cases, places.folder, setup.control, setup.blind)
     output.say(*lines, f"tables and picture: {places.folder}")
     return exit_code(f"case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
 

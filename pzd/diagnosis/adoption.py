@@ -38,7 +38,7 @@ from pzd.diagnosis.thresholds import (
     SCREENED_EFFECTS,
 )
 from pzd.record import Array
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 log = logging.getLogger(__name__)
 
@@ -312,7 +312,7 @@ def _possible_additions(current: _CriterionFit, config: DiagnoseConfig, adopted:
             for effect in library().values()
             if effect.name not in (*fitted.effects, *config.forbid)
             and effect.place != "sensor"
-            and not effect.about_zero
+            and not effect.needs_displacement_zero
             and testable(problem, effect)
         ]
         for effect in most_promising(problem, fitted, new, SCREENED_EFFECTS):

@@ -13,8 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from pzd.damper.effect import Scales
-from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
@@ -24,7 +24,7 @@ from pzd.diagnosis.fit.problem import Budget, Problem
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
 from pzd.diagnosis.thresholds import MOST_TIME_CONSTANTS
 from pzd.record import Array, Mask, voltage_scale
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 from pzd.signals.nuisance import NuisanceConfig
 
 Item = TypeVar("Item")
@@ -207,6 +207,6 @@ def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecor
 def nearest_row(rows: Sequence[BaseRow], prepared: PreparedRecord) -> int:
     """Return the index of the base row of a record: nearest voltage, and of its rows the nearest temperature."""
     voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
-    _, nearest = min(by_voltage(rows), key=lambda group: abs(group[0] - voltage))
+    _, nearest = min(rows_per_voltage(rows), key=lambda group: abs(group[0] - voltage))
     row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - temperature))
     return next(i for i, each in enumerate(rows) if each is row)

@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.artefacts import KeptBack, LeftOut, Prediction
-from pzd.damper.material import by_voltage, with_rows
+from pzd.artefacts import HeldOutTest, HeldOutVoltage, Prediction
 from pzd.damper.model import Damper
+from pzd.damper.parameter_rows import rows_per_voltage, with_rows
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit
@@ -25,7 +25,7 @@ from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.thresholds import INTERPOLATION_ERROR_RATIO, PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 # --- Folds: each test is held out once
 
@@ -58,7 +58,7 @@ def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     prepared : records of one setting
     baseline : damper whose base rows give the voltages
     """
-    nodes = [voltage for voltage, _ in by_voltage(baseline.base)]
+    nodes = [voltage for voltage, _ in rows_per_voltage(baseline.base)]
     members: dict[int, list[int]] = {}
     for i, p in enumerate(prepared):
         own = p.record.median_voltage() or 0.0
@@ -326,7 +326,7 @@ class CrossValidation(Folds):
             before, after = baseline.of_records([i]), final.of_records([i])
             if before.criterion is not None and after.criterion is not None:
                 tests.append(
-                    KeptBack(
+                    HeldOutTest(
                         record=self.campaign.prepared[i].record.name,
                         voltage=voltage if controlled else None,
                         W_s_plain=before.criterion,
@@ -351,12 +351,12 @@ class CrossValidation(Folds):
             kinds.add("segments" if self.campaign.prepared[i].cycles is None else "cycles")
         return kinds.pop() if len(kinds) == 1 else "mixed"
 
-    def _left_out(self, group: int, interpolation: PredictionError) -> LeftOut | None:
+    def _left_out(self, group: int, interpolation: PredictionError) -> HeldOutVoltage | None:
         voltage, both = self.voltages[group], (self.baseline_interpolation_error, interpolation)
         before, after = (each.of_records(self.groups[group]).criterion for each in both)
         if voltage is None or before is None or after is None:
             return None
-        return LeftOut(voltage=voltage, W_s_plain=before, W_s=after)
+        return HeldOutVoltage(voltage=voltage, W_s_plain=before, W_s=after)
 
     def _error_without_voltage(self, group: int, refit: _Refit) -> PredictionError:
         """Compute the error at one voltage, refitted without it and without the tests whose voltage moves."""
@@ -377,7 +377,7 @@ class CrossValidation(Folds):
         """Return the held-out samples at those voltages for which some test was left to fit."""
         constant = [voltage for voltage in self.voltages if voltage is not None]
         # By the nearest: rows of several temperatures have nearly, not exactly, the voltage of their group.
-        fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in by_voltage(damper.base)}
+        fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in rows_per_voltage(damper.base)}
         lost = {
             i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
         }
@@ -405,7 +405,7 @@ class CrossValidation(Folds):
             residual = force - predicted_force(damper, p)[kept]
             negligible = residual.size * (self.visible * float(np.max(np.abs(p.record.force)))) ** 2
             if i in self._lone_tests:
-                negligible += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
+                negligible += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
             entries.append((*squared_sums(force, residual), negligible))
         return PredictionError.of_entries(records, entries)

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import Rig
 from pzd.record import Array, Record, conditions, is_constant, sliced, voltage_scale
-from pzd.signals.cycles import Cycles, cycles, drift, settled
-from pzd.signals.jumps import without_noise
+from pzd.signals.cycles import Cycles, cycles, drift_over_cycles, settled_cycles
+from pzd.signals.jumps import denoised_control
 from pzd.signals.lack_of_fit import ShortTimeMask
-from pzd.signals.noise import neighbours, pure_error
+from pzd.signals.noise import neighbouring_harmonics, pure_error
+from pzd.signals.segmentation import separate_tests
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
-from pzd.signals.stretches import separate_tests
 
 Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
@@ -121,7 +121,7 @@ def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     average = AverageCycle.of(record, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
-        run = settled(run, record.time, record.force)
+        run = settled_cycles(run, record.time, record.force)
     kept = sliced(record, run.inside(record.time))
     cleaned = _with_motion(kept, motion(kept.time))
     if not constant:
@@ -136,7 +136,7 @@ def _denoised(record: Record, *, constant: bool) -> Record:
     """Remove sensor noise: a constant voltage is its median, a moving one levels and ramps; smooth temperature."""
     voltage, temperature = record.voltage, record.temperature
     if voltage is not None:
-        voltage = np.full(voltage.size, np.median(voltage)) if constant else without_noise(voltage)
+        voltage = np.full(voltage.size, np.median(voltage)) if constant else denoised_control(voltage)
     if temperature is not None and np.ptp(temperature) > 0.0:
         ends = _end_value(temperature), _end_value(temperature[::-1])
         temperature = temperature.copy()
@@ -190,7 +190,9 @@ class AverageCycle:
     def of(cls, record: Record, run: Cycles) -> AverageCycle:
         """Average the cycles of a record, and estimate how well the average is known."""
         folded = run.fold(record.time, record.displacement)
-        creep = drift(folded)  # else a mean that walks would end every cycle with a step, which the oil spring feels
+        creep = drift_over_cycles(
+            folded
+        )  # else a mean that walks would end every cycle with a step, which the oil spring feels
         error = pure_error(folded - creep + creep.mean())
         finest = float(np.median(np.diff(np.unique(record.displacement))))
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
@@ -227,7 +229,7 @@ class AverageCycle:
         drawn = [self._noise(draw) for draw in np.random.default_rng(DRAWS).spawn(DRAWS)]
         noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
         above = np.where(self.clear, 0.0, np.abs(self.harmonics - self.clear_harmonics) ** 2 - noise)
-        low, high = neighbours(above.size - 1)
+        low, high = neighbouring_harmonics(above.size - 1)
         sums, counts = (np.concatenate([[0.0], np.cumsum(each)]) for each in (above, ~self.clear))
         mean = (sums[high + 1] - sums[low]) / np.maximum(counts[high + 1] - counts[low], 1.0)
         power: Array = np.where(self.clear, 0.0, np.maximum(mean, 0.0))

@@ -16,11 +16,18 @@ from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
 from pzd.diagnosis.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask
 from pzd.signals.harmonics import hum
-from pzd.signals.jumps import jumps_in_cycles, jumps_in_samples, within_a_sample
-from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend, pooled
-from pzd.signals.noise import PureError, fit_smooth_residual, harmonics_of, pure_error, repeatable_power
-from pzd.signals.nuisance import NuisanceConfig, nuisance
-from pzd.signals.smoothing import reversals
+from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
+from pzd.signals.lack_of_fit import (
+    TREND_CYCLES,
+    TREND_HARMONICS,
+    fit_smooth_residual,
+    p_value_of_trend,
+    p_values_by_harmonics,
+    pooled_p_value,
+)
+from pzd.signals.measures import reversals
+from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
+from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +84,7 @@ def check_residual(
     variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
     size, timing = np.zeros(residual.size), np.zeros(residual.size)
-    size[mask], timing[mask] = nuisance(
+    size[mask], timing[mask] = nuisance_forces(
         without[mask], predicted[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask
     )
     near_jumps = _nuisance_near_jumps(record.force - mains, predicted, size, timing)
@@ -113,7 +120,7 @@ def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Ar
     force, predicted : (n,) [N]
     size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
     """
-    found = [part + within_a_sample(force - part, predicted) for part in (size, size + timing)]
+    found = [part + jump_timing_error(force - part, predicted) for part in (size, size + timing)]
     left = [np.abs(force - predicted - part) for part in found]
     return np.where(left[0] <= left[1], *found)
 
@@ -127,8 +134,8 @@ def _check_cycles(
     by_displacement: Array | float,
 ) -> ResidualCheck:
     error = replace(pure_error(folded), shared=by_displacement)
-    trend = by_trend(folded)
-    probability = {"harmonics": by_harmonics(error)}
+    trend = p_value_of_trend(folded)
+    probability = {"harmonics": p_values_by_harmonics(error)}
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
@@ -241,7 +248,9 @@ def _by_block(check: ResidualCheck, values: Array) -> Array:
 def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
     """Compute the probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for c in checks for kind in c.probability}
-    return min(1.0, *(len(kinds) * pooled([c.probability[k] for c in checks if k in c.probability]) for k in kinds))
+    return min(
+        1.0, *(len(kinds) * pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds)
+    )
 
 
 def visible_gap(checks: Sequence[ResidualCheck]) -> float:

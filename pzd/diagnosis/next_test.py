@@ -21,7 +21,7 @@ from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
 from pzd.diagnosis.data import PreparedRecord
 from pzd.record import Array
 from pzd.rig.config import Limits
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 FREQUENCIES = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 """Frequencies that are tried [Hz], beside the largest."""
@@ -306,7 +306,7 @@ def intermediate_voltage_test(
     fastest = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
     frequency = min(rounded_down(frequency_of(test), RECORDED_ERROR), fastest)
     motion = test_motion(sine, frequency, amplitude, voltage, temperature)
-    force = respond(damper, motion.about(-envelope.middle)) + offset
+    force = respond(damper, motion.centred_on(-envelope.middle)) + offset
     if np.min(force) < envelope.force[0] or np.max(force) > envelope.force[1]:
         return None
     return NextTest(

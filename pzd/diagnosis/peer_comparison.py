@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, Identified, KeptBack, Prediction, Rig, base_of
-from pzd.artefacts.diagnosis import HANDED_ON, PLAIN, PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts import Diagnosed, HeldOutTest, Identified, Prediction, Rig, base_of
+from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParameterRow, PeerRow
 from pzd.diagnosis.cross_validation import Folds, PredictionError, assign_folds, squared_sums
 from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
 from pzd.diagnosis.fit.prediction import comparable_samples
@@ -283,8 +283,8 @@ def _comparison(
 
     by_record = _by_record(tests, prediction.by)
     errors = {
-        PLAIN: tests.known_error({i: each.W_s_plain for i, each in by_record.items()}),
-        HANDED_ON: tests.known_error({i: each.W_s for i, each in by_record.items()}),
+        BASELINE: tests.known_error({i: each.W_s_plain for i, each in by_record.items()}),
+        ADOPTED: tests.known_error({i: each.W_s for i, each in by_record.items()}),
         **{name: tests.held_out_error(peer).of_records(tuple(by_record)) for name, peer in peers().items()},
     }
     for voltage, group in tests.groups:
@@ -298,8 +298,8 @@ def _comparison(
     for number, (voltage, _) in enumerate(tests.groups):
         if voltage in left_out:
             between = {
-                PLAIN: tests.known_interpolation_error(number, left_out[voltage].W_s_plain),
-                HANDED_ON: tests.known_interpolation_error(number, left_out[voltage].W_s),
+                BASELINE: tests.known_interpolation_error(number, left_out[voltage].W_s_plain),
+                ADOPTED: tests.known_interpolation_error(number, left_out[voltage].W_s),
                 **{name: tests.interpolation_error(peer, number) for name, peer in peers().items()},
             }
             add("voltage", voltage, None, between)
@@ -322,9 +322,9 @@ def _comparison(
     return PeerComparison(tuple(errors), tuple(rows), tuple(parameters), tuple(tests.moving))
 
 
-def _by_record(tests: HeldOutTests, by: Sequence[KeptBack]) -> dict[int, KeptBack]:
+def _by_record(tests: HeldOutTests, by: Sequence[HeldOutTest]) -> dict[int, HeldOutTest]:
     """Assign the figures of diagnosis.json to records of constant voltage; tests of one name come in its order."""
-    waiting: dict[str, list[KeptBack]] = {}
+    waiting: dict[str, list[HeldOutTest]] = {}
     for each in by:
         waiting.setdefault(each.record, []).append(each)
     found = {}

@@ -59,10 +59,10 @@ from pzd.diagnosis.verdict import (
     knee_verdict,
     no_prediction_note,
 )
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.condition import parameter_row
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import row_of
-from pzd.identification.prepared_record import Bingham
-from pzd.identification.trust import NAMES, ParameterEvidence, scales_of
+from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
@@ -273,10 +273,12 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
         evidence = [
             ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
-            for name, scale, width in zip(NAMES, scales_of(parameters, measured).tolist(), widths.tolist(), strict=True)
+            for name, scale, width in zip(
+                PARAMETER_NAMES, parameter_scales(parameters, measured).tolist(), widths.tolist(), strict=True
+            )
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)
-        rows.append(row_of(labels, parameters, widths, evidence, (measured, residuals)))
+        rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals)))
     return tuple(rows)
 
 

@@ -38,8 +38,8 @@ from pzd.diagnosis.thresholds import (
     SMALLEST_GAP,
 )
 from pzd.record import Array
-from pzd.signals.criterion import rms
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.measures import rms
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -356,7 +356,7 @@ def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
     found, size = [], []
     for check in checks:
         force = check.predicted[check.wanted]
-        columns = columns_of(force, check.prepared.record.rate, NUISANCE_UNITS, check.wanted)
+        columns = nuisance_columns(force, check.prepared.record.rate, NUISANCE_UNITS, check.wanted)
         found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
         size.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
     return np.array(found).reshape(-1, 3), np.mean(np.array(size).reshape(-1, 3), axis=0)

@@ -58,7 +58,7 @@ def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Con
 
     damper = diagnosed.damper
     records = [record for record in rig.records if record.setting == setting]
-    given = force.temperatures_of(diagnosed.plain), force.voltages_of(diagnosed.plain)
+    given = force.temperatures_of(diagnosed.baseline), force.voltages_of(diagnosed.baseline)
     envelope = force.operating_envelope(records, *given)
     nodes = force.grid(table, damper, _temperatures(table, damper, records), envelope)
     notes = TableNotes(

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pzd.artefacts.characteristics import (
+from pzd.artefacts.identified import (
     AsItStandsRow,
     Characteristics,
     ContinuousVelocityRow,

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
+from pzd.damper.compose import integrated_force, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows
 from pzd.identification.prepared_record import in_motion
 from pzd.identification.trust import MISFIT_THRESHOLD
 from pzd.record import Array, Mask, Record, mid_stroke
@@ -151,7 +152,7 @@ class KneeData:
     def of(cls, records: Sequence[Record]) -> KneeData:
         """Collect tests, their displacement counted from mid-stroke."""
         middle = mid_stroke(r.displacement for r in records)
-        found = (KneeRecord(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
+        found = (KneeRecord(r, Motion.of(r).centred_on(middle), sampling_steps(r.time), in_motion(r)) for r in records)
         return cls(tuple(found), middle)
 
     def subset(self, kept: Sequence[int]) -> KneeData:

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from pzd.artefacts import MeasureRow
-from pzd.artefacts.characteristics import Kind
+from pzd.artefacts.identified import Kind
 from pzd.artefacts.rig import SAME_MOTION, same_motion
 from pzd.identification.prepared_record import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale

@@ -20,7 +20,7 @@ from pzd.schema.csvfile import read_rows
 from pzd.schema.model import Frozen
 from pzd.simulate.config import KM_PER_H
 from pzd.simulate.policies import TieBreak
-from pzd.simulate.ride.energy import harmonic_response
+from pzd.simulate.ride.linear import harmonic_response
 from pzd.simulate.vehicle.car import HalfCar
 
 _PRINTED = published()

@@ -37,8 +37,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.parallel import chunks
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import Pools, Where
-from pzd.parallel.engines import local
+from pzd.parallel.engines import Pools, Where, local
 from pzd.parallel.processes import spawned_pool
 from pzd.schema.errors import ConfigError, DataError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.comfort.iso2631_1997 import evaluate, maximum_transient, reactions, vibration_dose
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 RATE = 1000.0
 TIME = np.arange(16000) / RATE

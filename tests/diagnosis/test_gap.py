@@ -20,10 +20,10 @@ from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import ResidualCheck, check_residual, gap_in_force, held_out_criterion, visible_gap
 from pzd.diagnosis.search.acceptance import leaves_gap
 from pzd.record import Array, Record, sliced
-from pzd.signals.jumps import jumps, parted, slope_within, unbroken
+from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, split_at_gaps
 from pzd.signals.kinematics import kinematics
 from pzd.signals.noise import autoregression
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 SOFT, HARD = 100.0, 1000.0
 """Peak forces of two tests [N]."""
@@ -243,17 +243,19 @@ def test_the_force_of_a_delay_is_its_slope_on_either_side_of_what_is_left_out() 
     t = np.arange(1000) / 1000.0
     force = 1000.0 * np.sin(2.0 * np.pi * t) + np.where(t < 0.5, 0.0, 500.0)
     counted = (t < 0.45) | (t > 0.55)
-    whole = columns_of(force, 1000.0, NuisanceConfig())[counted]
-    assert columns_of(force[counted], 1000.0, NuisanceConfig(), counted)[:, 2] == pytest.approx(whole[:, 2], abs=0.05)
+    whole = nuisance_columns(force, 1000.0, NuisanceConfig())[counted]
+    assert nuisance_columns(force[counted], 1000.0, NuisanceConfig(), counted)[:, 2] == pytest.approx(
+        whole[:, 2], abs=0.05
+    )
 
 
 def test_stretches_are_divided_at_every_left_out_sample() -> None:
     counted = np.array([0, 1, 1, 1, 0, 0, 1, 0, 1, 1], dtype=np.bool_)
     values = np.array([1.0, 2.0, 4.0, 9.0, 5.0, 8.0])
-    assert [part.tolist() for part in parted(values, counted)] == [[1.0, 2.0, 4.0], [9.0], [5.0, 8.0]]
-    assert slope_within(values, counted).tolist() == [1.0, 1.5, 2.0, 0.0, 3.0, 3.0]
-    assert unbroken(counted, 1).tolist() == [True, True, False, False, True]
-    assert unbroken(counted, 0).all()
+    assert [part.tolist() for part in split_at_gaps(values, counted)] == [[1.0, 2.0, 4.0], [9.0], [5.0, 8.0]]
+    assert gradient_within_stretches(values, counted).tolist() == [1.0, 1.5, 2.0, 0.0, 3.0, 3.0]
+    assert has_predecessors(counted, 1).tolist() == [True, True, False, False, True]
+    assert has_predecessors(counted, 0).all()
 
 
 def test_a_stretch_of_two_samples_does_not_whiten_the_others(rng: Generator) -> None:

@@ -14,7 +14,7 @@ from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
 
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
 from pzd.cli.look import diagnosis_lines
-from pzd.damper.compiled.laws import declared
+from pzd.damper.effect import declared_effect
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
@@ -216,7 +216,7 @@ def test_a_proposed_effect_file_keeps_to_the_rules_and_gives_the_force_of_its_sh
     second = {"second_coefficient": 2.0} if shape.startswith("sin") else {}
     proposal = proposal_of([row(shape, **second)], "runs/bypass", 150.0)
     module = loaded(proposal.name, proposal.text)
-    effect = declared(module)
+    effect = declared_effect(module)
     assert effect.name == proposal.name
     assert effect.name.isidentifier()
     ((given, expected),) = effect.tests
@@ -245,7 +245,7 @@ def test_a_shape_that_goes_with_the_control_signal_is_looked_for_by_voltage() ->
     proposal = proposal_of(
         [row("U |x| v", coefficient=100.0, coefficient_low95=90.0, coefficient_high95=110.0)], "r", 150.0
     )
-    (parameter,) = declared(loaded(proposal.name, proposal.text)).parameters
+    (parameter,) = declared_effect(loaded(proposal.name, proposal.text)).parameters
     assert parameter.with_friction
     assert parameter.search.scale(None) * parameter.search.starts[0] == pytest.approx(100.0 * 150.0)  # type: ignore[arg-type]  # it asks for no scales
 

@@ -280,7 +280,7 @@ def test_a_short_record_gets_no_finding_but_a_longer_test_to_record(rng: np.rand
     assert "(the longest record has 240)" in told.reason
     assert (told.effects, told.rivals, told.ranking, told.where) == ((), (), (), ())
     assert (told.gap, told.confidence, told.prediction) == (None, None, None)
-    assert found.damper == found.plain
+    assert found.damper == found.baseline
     assert len(found.parameters) == 1
     test = told.next_test
     assert test is not None

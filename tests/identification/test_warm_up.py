@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fresh_truths import TABLE_2, sine_test
 
-from pzd.artefacts.characteristics import Characteristics, WarmUpRow, courses
+from pzd.artefacts.identified import Characteristics, WarmUpRow, courses
 from pzd.cli.text_tables import characteristics_tables
 from pzd.identification.characteristics import characteristics
 from pzd.pipeline.run_summary import RunSummary

@@ -47,7 +47,7 @@ from pzd.schema.csvfile import write_rows
 from pzd.simulate.config import KM_PER_H, CarBlock, SimulateConfig
 from pzd.simulate.control.demand import TIE_BREAKS
 from pzd.simulate.policies import TieBreak
-from pzd.simulate.ride.energy import harmonic_response
+from pzd.simulate.ride.linear import harmonic_response
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.stage import simulate
 from pzd.simulate.vehicle.car import HalfCar

@@ -57,7 +57,9 @@ def left_by_the_truth(config: RunConfig, setup: BenchmarkSetup, folder: Path, tr
     parts = split(prepared, config.identify.group.voltage_V, config.identify.group.temperature_degC)
     campaign = Campaign(prepared, parts, config.diagnose.nuisance, 1, Budget(config.diagnose.most_evaluations))
     whole = evidence_of(campaign, base_of(identified.rows, None)).whole
-    of_voltages = whole if len(whole.base) == len(truth.base) else whole.pooled_temperatures()  # the truth has no temperature axis
+    of_voltages = (
+        whole if len(whole.base) == len(truth.base) else whole.pooled_temperatures()
+    )  # the truth has no temperature axis
     found = fit(of_voltages, tuple(truth.effects), of_voltages.start_with(truth), MOST_STEPS)
     checks = campaign.checks(found.damper)
     return Left(visible_gap(checks), probability_of_noise(checks))

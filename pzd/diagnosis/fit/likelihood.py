@@ -16,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moments
-from pzd.damper.material import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import effective_voltage
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import PredictedForce, simulation_motion, temperature_moves
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
-from pzd.signals.jumps import jumps, jumps_in_samples, slope_within, unbroken
-from pzd.signals.noise import Autoregression, PureError, fit_smooth_residual, pure_error
+from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, jumps_in_samples
+from pzd.signals.lack_of_fit import fit_smooth_residual
+from pzd.signals.measures import reversals
+from pzd.signals.noise import Autoregression, PureError, pure_error
 from pzd.signals.nuisance import NuisanceConfig
-from pzd.signals.smoothing import reversals
 
 # --- Nuisances
 
@@ -201,7 +202,9 @@ class WeightedRecord:
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
         """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
-        return unbroken(self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0)
+        return has_predecessors(
+            self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0
+        )
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
@@ -393,14 +396,17 @@ def _from_samples(
     alike = _samples_per_harmonic(record)
     left = (
         alike
-        * (DISCREPANCY * _model_discrepancy(measured, force[mask], slope_within(force[mask], mask), noise.variance))
+        * (
+            DISCREPANCY
+            * _model_discrepancy(measured, force[mask], gradient_within_stretches(force[mask], mask), noise.variance)
+        )
         ** 2
     )
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
     motion, places = simulation_motion(record)
-    rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
+    rows = int(np.count_nonzero(has_predecessors(compared, noise.coefficients.size)))
     bare = WeightedRecord(
         record.name,
         base_row,

@@ -10,11 +10,10 @@ from typing import cast
 
 import numpy as np
 
-from pzd.damper.compiled.rows import Nodes, nodes_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import Effect, Parameter, Scales, Search
-from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.record import Array
 
@@ -144,17 +143,17 @@ class Problem:
     @cached_property
     def voltages(self) -> tuple[float, ...]:
         """(v,) voltages of the base rows [V], rising."""
-        return tuple(voltage for voltage, _ in by_voltage(self.base))
+        return tuple(voltage for voltage, _ in rows_per_voltage(self.base))
 
     @cached_property
     def nodes(self) -> tuple[int, ...]:
         """(b,) index of the voltage of every base row."""
-        place = {id(row): i for i, (_, rows) in enumerate(by_voltage(self.base)) for row in rows}
+        place = {id(row): i for i, (_, rows) in enumerate(rows_per_voltage(self.base)) for row in rows}
         return tuple(place[id(row)] for row in self.base)
 
     def pooled_temperatures(self) -> Problem:
         """Return the problem with one base row per voltage, for effects that replace the temperature axis."""
-        groups = [rows for _, rows in by_voltage(self.base)]
+        groups = [rows for _, rows in rows_per_voltage(self.base)]
         if len(groups) == len(self.base):
             return self
         place = {id(row): i for i, rows in enumerate(groups) for row in rows}
@@ -179,7 +178,7 @@ class Problem:
         for name in effects:
             nodes = range(len(self.voltages)) if name in self.per_voltage else (None,)
             found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
-            if known()[name].about_zero and all(u.parameter is not ZERO for u in found):
+            if known()[name].needs_displacement_zero and all(u.parameter is not ZERO for u in found):
                 found.append(self._unknown(name, ZERO, None))
         return tuple(found)
 
@@ -237,7 +236,7 @@ class Point:
     problem: Problem
     displacement_zero: float = 0.0
     """Zero of the displacement [m]."""
-    _nodes_by_temperature: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
+    _nodes_by_temperature: dict[float | None, DamperNodes] = field(default_factory=dict, repr=False)
 
     @cached_property
     def damper(self) -> Damper:
@@ -259,7 +258,7 @@ class Point:
             zero_m=self.displacement_zero,
         )
 
-    def nodes(self, temperature: float | None) -> Nodes:
+    def nodes(self, temperature: float | None) -> DamperNodes:
         """Return the rows at the nodes of voltage, at one temperature [degC]; cached."""
         problem = self.problem
         if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):

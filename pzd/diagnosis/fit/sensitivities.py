@@ -9,20 +9,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled.laws import ELEMENT
-from pzd.damper.compiled.rows import rows_along
-from pzd.damper.compose import (
+from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
+from pzd.damper.confounders import known
+from pzd.damper.effect import ELEMENT
+from pzd.damper.parameter_rows import (
     constant_rows,
-    constant_value,
     drive_row_of,
     element_rows,
-    forces_beside,
-    integrated_sensitivities,
+    material_factors,
     parallel_rows,
-    sensors_of,
+    rows_along,
 )
-from pzd.damper.confounders import known
-from pzd.damper.material import material_factors
+from pzd.damper.path import Variables
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
 from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
 from pzd.record import Array
@@ -76,7 +74,7 @@ class KernelInputs:
         return (
             np.zeros(1)
             if self.parallel is None
-            else forces_beside(o.motion.about(self.displacement_zero), self.parallel)
+            else parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
         )
 
 
@@ -168,12 +166,10 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
     initial_slopes = np.array([-change[0] for change in changes])
     force, slopes = integrated_sensitivities(
         given.centre.rows,
-        given.changed,
-        given.derivatives,
+        Variables(given.changed, given.derivatives, initial_slopes),
         o.motion,
         o.steps,
         o.initial_force - float(parallel[0]),
-        initial_slopes,
         SIMULATION_TOLERANCE,
     )
     force = force + parallel

@@ -11,7 +11,7 @@ from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend
 from pzd.report.rig_tests import settled
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 
 # --- Before and after, on held-out data ---
 

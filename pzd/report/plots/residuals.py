@@ -13,16 +13,16 @@ from itertools import groupby
 import numpy as np
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import identify_condition
 from pzd.quantities import DAMPING, DISPLACEMENT, FORCE, FRICTION, STIFFNESS, VELOCITY
 from pzd.record import Array, Condition, Record, is_constant, voltage_scale
 from pzd.report.blocks import number, unit_of
 from pzd.report.context import ReportContext
 from pzd.report.drawing import AXIS, BASELINE, FINAL, MEASURED, Panel, Plot, axes, legend, legend_lines, shades
 from pzd.report.rig_tests import settled
-from pzd.signals.criterion import rms
 from pzd.signals.cycles import cycles
+from pzd.signals.measures import rms
 
 
 def _unexplained(context: ReportContext) -> bool:

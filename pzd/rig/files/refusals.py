@@ -11,7 +11,7 @@ from pzd.record import Array, clock_fault
 from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.layout import Layout
 from pzd.schema.errors import DataError
-from pzd.signals.smoothing import REVERSAL_SHARE, reversals, work, work_of_chance
+from pzd.signals.measures import REVERSAL_SHARE, chance_work, reversals, work
 
 # --- Work over a whole test: negative where a sign is wrong ---
 
@@ -26,7 +26,7 @@ def works_on_the_rig(alone: DamperAlone) -> bool:
     hardly slips.
     """
     x, force = alone.displacement, alone.force
-    chance = work_of_chance(x, force)
+    chance = chance_work(x, force)
     return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 

@@ -16,12 +16,12 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, extent
+from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, entry_numbers
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
-from pzd.signals.cycles import Cycles, remember
+from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics
 
 
@@ -118,14 +118,14 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
             setting=test.record.setting,
             findings=findings(test) if preflight else (),
             removed=test.removed,
-            **extent(test.record, test.cycles),
+            **entry_numbers(test.record, test.cycles),
         )
         return test.record, test.cycles, entry, test.ingested
 
     results = parallel_map(examine, tests, jobs)
     # Records were made in other processes, whose memory of the cycles is lost here.
     for record, cycles, _, _ in results:
-        remember(record, cycles)
+        remember_cycles(record, cycles)
     entries = tuple(entry for _, _, entry, _ in results)
     for family in families():
         for compare in getattr(family, "COMPARISONS", ()):

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import Array, Rows, from_neighbours, glitches, is_constant, voltage_scale
+from pzd.record import Array, Rows, deviation_from_median, glitches, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
-from pzd.signals.harmonics import LEAST_RATE, MAINS, lines
+from pzd.signals.harmonics import LEAST_RATE, MAINS, line_amplitudes
 
 # --- Saturation ---
 
@@ -70,7 +70,7 @@ EDGE = 3
 def spikes(test: PreflightRecord) -> Iterator[Finding]:
     """Find samples of a channel that jump away from their neighbours and back."""
     for channel in test.channels():
-        away = from_neighbours(channel.values)
+        away = deviation_from_median(channel.values)
         deviation, rows = np.abs(away), glitches(channel.values, away)
         if channel.same_condition is None:
             rows = rows[(rows >= EDGE) & (rows < deviation.size - EDGE)]
@@ -107,8 +107,8 @@ def hum(test: PreflightRecord) -> Iterator[Finding]:
         least = HUM_SHARE * (0.5 * float(np.ptp(channel.values)) + LABEL_SHARE * (channel.same_condition or 0.0))
         mains = [line for line in MAINS if test.record.rate >= LEAST_RATE * line]
         # A line that the harmonics of the motion hide shows once the average cycle is taken out.
-        whole = lines(channel.values, test.record.rate, mains, frequency)
-        aperiodic = lines(_without_average_cycle(test, channel.values), test.record.rate, mains, 0.0)
+        whole = line_amplitudes(channel.values, test.record.rate, mains, frequency)
+        aperiodic = line_amplitudes(_without_average_cycle(test, channel.values), test.record.rate, mains, 0.0)
         for line, of_whole, of_aperiodic in zip(mains, whole, aperiodic, strict=True):
             amplitude = of_whole or of_aperiodic
             if amplitude > least:

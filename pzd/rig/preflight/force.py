@@ -24,7 +24,7 @@ from pzd.damper.element import element_forces
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.cycles import Cycles
-from pzd.signals.kinematics import drift_of
+from pzd.signals.kinematics import mean_over_period
 
 # --- Offset ---
 
@@ -270,7 +270,7 @@ def _beginning(test: PreflightRecord) -> Section:
 
 def _average_cycle(test: PreflightRecord, cycles: Cycles) -> Section:
     record = test.record
-    steady = test.clean.displacement - drift_of(record.time, test.clean.displacement, cycles)
+    steady = test.clean.displacement - mean_over_period(record.time, test.clean.displacement, cycles)
     x, force = cycles.mean(record.time, steady), cycles.mean(record.time, record.force)
     every = -(-x.size // MOST_SAMPLES)
     spectrum, harmonics = np.fft.rfft(force), np.arange(force.size // 2 + 1)

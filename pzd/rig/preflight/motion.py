@@ -8,10 +8,9 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import PreflightRecord
-from pzd.signals import stretches
-from pzd.signals.criterion import rms
-from pzd.signals.period import moving
-from pzd.signals.smoothing import reversals
+from pzd.signals.measures import reversals, rms
+from pzd.signals.period import moving_range
+from pzd.signals.segmentation import steps_between_tests
 
 ENOUGH_CYCLES = 3.0
 """Cycles from which their scatter tells something about the noise."""
@@ -59,7 +58,7 @@ def reach(test: PreflightRecord) -> Iterator[Finding]:
                 unit=unit,
                 follows="the stand may not have followed or measured this: check rig.limits, units and the range",
             )
-    first, last = moving(record.displacement)
+    first, last = moving_range(record.displacement)
     rest = 1.0 - (last - first + 1) / record.time.size
     if rest > REST:
         yield Finding(
@@ -125,7 +124,7 @@ def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
 
 def steps(test: PreflightRecord) -> Iterator[Finding]:
     """Find steps of amplitude or frequency between stretches of three or more equal cycles."""
-    for old, new in stretches.steps(test.record.time, test.clean.displacement):
+    for old, new in steps_between_tests(test.record.time, test.clean.displacement):
         before, after = (f"{1e3 * s.amplitude:.3g} mm at {1.0 / s.period:.3g} Hz" for s in (old, new))
         yield Finding(
             check="steps",

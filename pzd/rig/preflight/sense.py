@@ -8,13 +8,13 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import PreflightRecord
-from pzd.signals.smoothing import work, work_of_chance
+from pzd.signals.measures import chance_work, work
 
 
 def sign(test: PreflightRecord) -> Iterator[Finding]:
     """Find cycles with negative work, or a record whose steady force outweighs its loops."""
     record = test.record
-    if work(record.displacement, record.force) < -work_of_chance(record.displacement, record.force):
+    if work(record.displacement, record.force) < -chance_work(record.displacement, record.force):
         yield Finding(
             check="sign",
             where="the whole record",
@@ -29,7 +29,7 @@ def sign(test: PreflightRecord) -> Iterator[Finding]:
     # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
     cycles = [number == k for k in range(test.cycles.count)]
     works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
-    negative = np.flatnonzero(works < -work_of_chance(record.displacement, record.force, cycles=1.0))
+    negative = np.flatnonzero(works < -chance_work(record.displacement, record.force, cycles=1.0))
     if negative.size:
         first = test.cycles.start + float(negative[0]) * test.cycles.period
         yield Finding(

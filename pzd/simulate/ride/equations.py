@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compiled.rows import row_at
+from pzd.damper.parameter_rows import row_at
 from pzd.damper.regimes import spring_energy
 from pzd.force_table.lookup import table_force
 from pzd.record import Array

@@ -28,7 +28,7 @@ from pzd.comfort.iso2631_1997 import INTEGRATION_TIME_S
 from pzd.comfort.weighting import MEMORY_S, weighted
 from pzd.record import Array
 from pzd.schema.model import Frozen
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.signals.noise import all_pole
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.loop import A_K, COLUMNS, LOAD_1, LOAD_2, LOST, TRAVEL

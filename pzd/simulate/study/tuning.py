@@ -11,7 +11,7 @@ import numpy as np
 from pzd.comfort.weighting import weighted
 from pzd.force_table.lookup import table_range
 from pzd.record import Array
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.model import DynamicDamper, TableArrays

@@ -28,7 +28,7 @@ from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData, RigTest
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, TABLES, Loop, loop_of, table_damper
 from pzd.record import Array
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 
 _POINTS = 1000
 """Of a drawn cycle: fewer than one a pixel would show."""

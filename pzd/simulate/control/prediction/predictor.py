@@ -17,7 +17,7 @@ from pzd.comfort.weighting import modes as modes_of
 from pzd.compiled import compiled
 from pzd.damper.compiled.columns import DRIVE, NEUTRAL, STROKE_AND_FLOW, acting
 from pzd.damper.compiled.kernels import C, K, row_of
-from pzd.damper.compiled.laws import ELEMENT
+from pzd.damper.effect import ELEMENT
 from pzd.damper.flow import breakaway, flow_force
 from pzd.record import Array, Complex, Rows
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
