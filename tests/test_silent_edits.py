@@ -228,7 +228,7 @@ OF_NO_SUCH_EFFECT = [
     (
         "effects:\n",
         "effects:\n  lash:\n    delta: 0.001\n",
-        "yaml: effects: must be those of diagnosis.json and plain.yaml, gas_spring, preload_offset (got lash, gas_spring",
+        "yaml: effects: must be those of diagnosis.json and plain.yaml, gas_spring, preload_offset (got lash, gas",
     ),
 ]
 """What is edited in damper.yaml, and the refusal."""
