@@ -155,7 +155,7 @@ def bypass(bypass_records: tuple[Record, ...]) -> Diagnosed:
 def test_a_hypothesis_leaves_the_adopted_damper_unchanged(
     bypass: Diagnosed, bypass_records: tuple[Record, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.diagnosis.stage.hypotheses", lambda *_: Hypotheses())
+    monkeypatch.setattr("pzd.diagnosis.workflow.hypotheses", lambda *_: Hypotheses())
     without = diagnosed(bypass_records, forbid=all_but("gas_spring"))
     for name, one in (("with", bypass), ("without", without)):
         (tmp_path / name).mkdir()

@@ -21,7 +21,7 @@ from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import check_residual
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.stage import parameters_of
+from pzd.diagnosis.workflow import parameters_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
@@ -273,7 +273,7 @@ def test_a_play_is_found_in_the_unit_of_the_control_and_an_orifice_in_its_own(
         SimpleNamespace(effect=name, parameter=library()[name].parameters[0], value_in=lambda _, value=value: value)
         for name, value in names.items()
     ]
-    monkeypatch.setattr("pzd.diagnosis.stage.standard_errors", lambda _: (0.1, 10.0))
+    monkeypatch.setattr("pzd.diagnosis.workflow.standard_errors", lambda _: (0.1, 10.0))
     selection = cast("Selection", SimpleNamespace(fitted=SimpleNamespace(damper=damper, unknowns=unknowns)))
     found = parameters_of(selection, control)
     assert (found["piezo_hysteresis"]["r"].value, found["piezo_hysteresis"]["r"].unit) == (5.0, unit)

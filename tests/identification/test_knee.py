@@ -25,7 +25,7 @@ from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.stage import as_fitted
+from pzd.diagnosis.verdict import knee_verdict
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.knee import TRADE_SPEEDS, force_changes, identify_knees, law_row
 from pzd.identification.stage import identify
@@ -174,10 +174,10 @@ def test_the_files_of_the_knee_law_read_back_as_written(with_a_knee: Identified,
     assert Identified.read(tmp_path, Control()).knees == with_a_knee.knees
 
 
-def test_the_damper_with_the_knee_goes_through_diagnose_as_it_was_fitted(
+def test_the_damper_with_the_knee_goes_through_diagnose_as_it_wknee_verdict(
     with_a_knee: Identified, tmp_path: Path
 ) -> None:
-    handed = as_fitted(with_a_knee, None, DiagnoseConfig())
+    handed = knee_verdict(with_a_knee, None, DiagnoseConfig())
     assert handed.damper == handed.baseline == identified_damper(with_a_knee, None)
     assert handed.diagnosis.verdict == "none"
     assert "no effect was looked for" in handed.diagnosis.reason
@@ -193,7 +193,7 @@ def test_the_damper_with_the_knee_goes_through_diagnose_as_it_was_fitted(
 
 
 def test_what_the_law_misses_visibly_is_unexplained_and_not_nothing(with_round_knees: Identified) -> None:
-    handed = as_fitted(with_round_knees, None, DiagnoseConfig())
+    handed = knee_verdict(with_round_knees, None, DiagnoseConfig())
     assert handed.diagnosis.verdict == "unexplained"
     assert "misses up to" in handed.diagnosis.reason
 
@@ -285,7 +285,7 @@ def test_a_spring_below_zero_that_the_tests_show_is_read_back(tmp_path: Path) ->
     ends = {f"gas_spring_N_per_m{end}": value for end, value in (("", -900.0), ("_low95", -950.0), ("_high95", -850.0))}
     law = LawRow(setting=None, law="knee", tests=0, W_s_bingham=None, W_s_knee=None, reason="as the config asks for")
     here = Identified((), (), knees=Knees((knee_row().model_copy(update=ends),), laws=(law,)))
-    handed = as_fitted(here, None, DiagnoseConfig())
+    handed = knee_verdict(here, None, DiagnoseConfig())
     handed.write(tmp_path, Control())
     assert Diagnosed.read(tmp_path, Control()).damper.effects["gas_spring"] == {"k_g": -900.0}
 

@@ -10,11 +10,10 @@ import pytest
 from fresh_truths import TABLE_2, sine_test
 
 from pzd.artefacts.identified import Characteristics, WarmUpRow, courses
-from pzd.cli.text_tables import characteristics_tables
 from pzd.identification.characteristics import characteristics
-from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control
 from pzd.record import Record, conditions
+from pzd.report import tables
 
 FADES_PER_K = 0.01
 GAS = 85.0
@@ -115,12 +114,9 @@ def test_warm_up_rows_are_written_and_read_back_and_an_earlier_run_has_none(tmp_
     assert Characteristics.read(tmp_path, current) == replace(found, warm_up=())
 
 
-def test_the_terminal_shows_the_warm_up(tmp_path: Path) -> None:
+def test_the_terminal_shows_the_warm_up() -> None:
     found = Characteristics(warm_up=tuple(row(n, 100.0 * n, warmth=20.0 + n) for n in range(1, 8)))
-    shown = RunSummary(tmp_path, Control(), (), None, (), (), None, (), characteristics=found)
-    titles = dict(characteristics_tables(shown))
-    (rows,) = [rows for title, rows in titles.items() if title.startswith("warm-up")]
-    assert rows == [
-        ["speed [m/s]", "cycles", "T [degC]", "rebound [N]", "compression [N]", "record"],
-        ["0.1", "7", "22 to 26", "200 to 600", "-200 to -600", "r"],
+    assert tables.warm_up(found, Control()).lines() == [
+        "speed [m/s]  cycles  temperature [degC]  rebound [N]  compression [N]  record",
+        "0.1          7       22 to 26            200 to 600   -200 to -600     r",
     ]

@@ -2,12 +2,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign import coloured
 
+from pzd.record import Array
 from pzd.signals.lack_of_fit import octave_bands, p_value_of_trend, p_values_by_harmonics, pooled_p_value
 from pzd.signals.noise import autoregression, pure_error, repeatable_power
 
 COLOURS = (0.0, 0.5, 0.9)
+
+
+def coloured(rng: np.random.Generator, count: int, level: float, colour: float) -> Array:
+    """Noise of that r.m.s., e_i = colour e_(i-1) + w_i."""
+    from scipy.signal import lfilter
+
+    white = rng.standard_normal(count + 2000)
+    return np.asarray(level * np.sqrt(1.0 - colour**2) * lfilter([1.0], [1.0, -colour], white)[2000:])
 
 
 @pytest.mark.parametrize("colour", COLOURS)

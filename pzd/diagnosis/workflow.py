@@ -1,0 +1,289 @@
+"""From the records of one setting to verdict, adopted damper and next test: the steps of the diagnosis in order."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pzd.artefacts import (
+    Diagnosed,
+    Diagnosis,
+    Gap,
+    Identified,
+    NextTest,
+    ParameterRow,
+    Ranked,
+    Rig,
+    Value,
+    base_of,
+)
+from pzd.damper.effect import Parameter
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+from pzd.diagnosis.adoption import Adoption
+from pzd.diagnosis.campaign import Campaign, Evidence
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
+from pzd.diagnosis.data import (
+    TRAINING,
+    PreparedRecord,
+    centred_on,
+    prepare,
+    saturation_note,
+    split,
+    unsaturated_records,
+)
+from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, standard_errors
+from pzd.diagnosis.fit.problem import Budget
+from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions
+from pzd.diagnosis.hypotheses import hypotheses
+from pzd.diagnosis.next_test import (
+    OperatingEnvelope,
+    intermediate_voltage_test,
+    operating_envelope,
+    repeated_longest_test,
+    separating_test,
+)
+from pzd.diagnosis.search.acceptance import Selection
+from pzd.diagnosis.search.forward_selection import select_effects
+from pzd.diagnosis.verdict import (
+    Decision,
+    Verdict,
+    conclude,
+    hold_out_note,
+    insufficient_data,
+    insufficient_data_diagnosis,
+    knee_verdict,
+    no_prediction_note,
+)
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.condition import parameter_row
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales
+from pzd.quantities import Control
+from pzd.record import mid_stroke
+from pzd.rig.config import RigConfig
+from pzd.schema.errors import counted
+
+log = logging.getLogger(__name__)
+
+
+def diagnose_setting(
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    stand: RigConfig,
+    rig: Rig,
+    identified: Identified,
+    control: Control,
+    setting: str | None,
+    jobs: int,
+) -> Diagnosed:
+    """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
+    if identified.knees.law_of(setting) == "knee":
+        return knee_verdict(identified, setting, diagnose)
+    records, saturated = unsaturated_records(rig, setting)
+    recorded = prepare(records)
+    # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
+    prepared = centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
+    roles = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
+    baseline = base_of(identified.rows, setting)
+    campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
+    rows = tuple(row for row in identified.rows if row.setting == setting)
+    voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
+    envelope = operating_envelope(stand.limits, recorded, voltages)
+    if insufficient_data(campaign):
+        return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
+    validation = cross_validation_of(campaign, baseline, diagnose.visible)
+    selected = select_effects(campaign, baseline, diagnose, jobs)
+    adoption, decision = conclude(selected, validation, diagnose, control.unit)
+    selection, prediction = adoption.selection, adoption.prediction(validation)
+    before = campaign.checks(selection.baseline.damper)
+    log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
+    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), saturation_note(saturated), _hum(before)
+    final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
+    diagnosis = Diagnosis(
+        verdict=decision.verdict,
+        reason="".join((decision.reason, campaign.budget.note, *limits)),
+        effects=selection.adopted,
+        confidence=decision.confidence,
+        gap=held_out_gap(selection, validation if adoption.by_criterion else None),
+        parameters=parameters_of(selection, control),
+        prediction=prediction,
+        zero_m=final.zero_m,
+        ranking=ranking_of(selection, selection.initial_evidence),
+        rivals=(*selection.rivals, *decision.possible),
+        where=() if decision.verdict == "none" else regions(before, control.unit, zero),
+        next_test=_next_test(adoption, decision, final, zero, validation, recorded, envelope),
+    )
+    if selection.adopted:
+        rows = base_parameters(selection, decision.verdict, setting)
+    shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
+    return Diagnosed(diagnosis, final, baseline, rows, shapes)
+
+
+def _hum(checks: Sequence[ResidualCheck]) -> str:
+    """Say in how many tests mains hum was found, which counts as no gap."""
+    loud = [check.hum for check in checks if check.hum > 0.0]
+    return f"; mains hum of up to {max(loud):.2g} N in {counted(len(loud), 'test')} is taken for no gap" if loud else ""
+
+
+def _next_test(
+    adoption: Adoption,
+    decision: Decision,
+    final: Damper,
+    zero: float,
+    validation: CrossValidation,
+    recorded: Sequence[PreparedRecord],
+    envelope: OperatingEnvelope,
+) -> NextTest | None:
+    """Propose the test that separates rivals, or without rivals one at a voltage where the prediction is worst.
+
+    What may be chance of few tests, or is not excluded by them, is settled by one more.
+    """
+    selection = adoption.selection
+    campaign, temperature = selection.initial_evidence.campaign, selection.initial_evidence.whole.reference_temperature
+    if selection.rival_dampers:
+        rivals = [(name, damper.moved(zero)) for name, damper in selection.rival_dampers]
+        offsets = [campaign.offset(damper) for _, damper in selection.rival_dampers]
+        return separating_test(rivals, envelope, temperature, offsets)
+    if decision.doubtful:
+        return repeated_longest_test(recorded, envelope)
+    offset = campaign.offset(final.moved(-zero) if selection.adopted else final)
+    errors = adoption.error, adoption.interpolation_error
+    return intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
+
+
+# --- Entries of the files: ranking, parameters with intervals, and the held-out gap
+
+
+def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
+    """List every candidate at the step that decided on it, best first, adopted ones in front.
+
+    `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
+    """
+    rows: dict[str, Ranked] = {}
+    for step in selection.steps:
+        for c in step.tried:
+            if step.tried is not selection.deciding(c.effect):
+                continue
+            reason = "does not pay" if c.delta_bic > 0.0 else "explains less"
+            reason = selection.reasons.get(c.effect, reason if c.searched else "promises too little to be searched for")
+            damper = selection.fitted.damper if c.effect in selection.adopted else c.fitted.damper
+            values: dict[str, Any] = dict(damper.effects[c.effect])
+            rows[c.effect] = Ranked(
+                effect=c.effect,
+                gap_after=evidence.criterion(c.fitted),
+                delta_bic=round(c.delta_bic, 3),
+                at_voltage_V=values.pop("at_voltage_V", None),
+                parameters=values,
+                reason="rival" if c.effect in selection.rivals else reason,
+            )
+    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, r.delta_bic)))
+
+
+def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str, Value]]:
+    """Return the parameters of the adopted effects with 95 % intervals, in units of this control signal."""
+    damper, errors = selection.fitted.damper, standard_errors(selection.fitted)
+    found: dict[str, dict[str, Value]] = {}
+    for name, values in damper.effects.items():
+        nodes = values.get("at_voltage_V")
+        for parameter in library()[name].parameters:
+            mine = [
+                (u.value_in(damper), float(error))
+                for u, error in zip(selection.fitted.unknowns, errors, strict=True)
+                if (u.effect, u.parameter.name) == (name, parameter.name)
+            ]
+            found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes, control)
+    return found
+
+
+def _value(
+    estimates: Sequence[tuple[float, float]],
+    parameter: Parameter,
+    nodes: float | tuple[float, ...] | None,
+    control: Control,
+) -> Value:
+    """Return a parameter with its 95 % interval clipped to its limits.
+
+    Parameters
+    ----------
+    estimates : value and standard error, one per voltage or a single one
+    parameter : its unit and limits
+    nodes : the voltages [V]; None for a single value
+    control : whose unit stands in the place of V
+    """
+    unit = control.own_unit(parameter.unit)
+    middle = tuple(value for value, _ in estimates)
+    low = tuple(max(value - LEVEL * error, parameter.low) for value, error in estimates)
+    high = tuple(min(value + LEVEL * error, parameter.high) for value, error in estimates)
+    if not isinstance(nodes, tuple):
+        return Value(value=middle[0], low95=low[0], high95=high[0], unit=unit)
+    return Value(value=middle, low95=low, high95=high, unit=unit, at_voltage_V=nodes)
+
+
+DOUBTS: dict[Verdict, str] = {
+    "unexplained": "something is still missed: the parameters are the model's, not the damper's",
+    "ambiguous": "a rival effect would leave other values",
+}
+"""Why no row is `ok` under a verdict."""
+SHOWN = 1.0
+"""Share of the force that a parameter moves, for its status: what the tests do not show has a wide interval here."""
+
+
+def base_parameters(selection: Selection, verdict: Verdict, setting: str | None) -> tuple[ParameterRow, ...]:
+    """Return T0, C and k fitted with the effects, judged by their 95 % intervals as identify judges its own.
+
+    An interval allows for noise, for the sensors' priors, and for how far the tests disagree; it holds the damper's own
+    parameters where the adopted effects are all that there is.
+
+    Parameters
+    ----------
+    selection : effects adopted
+    verdict : of the diagnosis
+    setting : of the rig's settings, the one in use
+    """
+    fitted, whole = selection.fitted, selection.final_evidence.whole
+    compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
+    rows = []
+    for place, (row, widths) in enumerate(
+        zip(fitted.damper.base, base_half_widths(fitted, whole.scales.force), strict=True)
+    ):
+        mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
+        measured = np.concatenate([m for m, _ in mine])
+        residuals = measured - np.concatenate([f for _, f in mine])
+        parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
+        evidence = [
+            ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
+            for name, scale, width in zip(
+                PARAMETER_NAMES, parameter_scales(parameters, measured).tolist(), widths.tolist(), strict=True
+            )
+        ]
+        labels = (setting, row.voltage_V, row.temperature_degC)
+        rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals)))
+    return tuple(rows)
+
+
+def held_out_gap(selection: Selection, validation: CrossValidation | None = None) -> Gap:
+    """Compute criterion (4) on the held-out samples before and after, with nuisances at their prior mean.
+
+    Both dampers are fitted to the training samples alone.
+
+    Parameters
+    ----------
+    selection : effects adopted, and the evidence whose first half trains
+    validation : the tests, where the adopted damper is fitted by criterion (4); None where it is by likelihood
+    """
+    campaign, training = selection.initial_evidence.campaign, selection.initial_evidence.halves[0]
+    baseline = fit(training, (), training.start()).damper
+    before = held_out_criterion(campaign.held_out_checks(baseline), campaign.split)
+    if not selection.adopted:
+        return before
+    not_training = [~mask for mask in campaign.in_role(TRAINING)]
+    found = None if validation is None else validation.fit_by_criterion(selection.fitted.damper, not_training)
+    training = selection.final_evidence.halves[0]
+    adopted = found[1] if found else fit(training, selection.adopted, training.start_with(selection.fitted.damper))
+    after = held_out_criterion(campaign.held_out_checks(adopted.damper), campaign.split)
+    return after.model_copy(update={"before": before.before})
