@@ -73,7 +73,7 @@ bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that 
 
 .PHONY: coverage-study
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
-	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identification $(BIN)/python tests/studies/coverage_study.py
 
 .PHONY: sensitivity
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour

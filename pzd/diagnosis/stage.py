@@ -1,7 +1,7 @@
 """The diagnose stage: where simulation and measurement disagree, and which effect is missing.
 
-Only its declaration stands here. The work is in `workflow.py`, which is imported when the stage runs: a command that finds
-all results fresh reads the declaration, and need not load numba and scipy for it.
+Only its declaration stands here. The work is in `workflow.py`, which is imported when the stage runs: a command that
+finds all results fresh reads the declaration, and need not load numba and scipy for it.
 """
 
 from __future__ import annotations
