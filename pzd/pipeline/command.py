@@ -23,9 +23,6 @@ from pzd.schema.validate import canonical_nodes
 from pzd.schema.yamlfile import Document
 from pzd.schema.yamltree import Node
 
-# ----------------------------------------------------------------------------------------------------
-
-
 _SUFFIXES = (".yaml", ".yml", ".json")
 """Of a config; JSON is YAML too."""
 
@@ -194,9 +191,7 @@ def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:
         check_settings(given.config, [entry.setting for entry in entries])
 
 
-# ----------------------------------------------------------------------------------------------------
-# Every value of a config as a run takes it, with where it comes from: a line of the file, `--set`, or the default.
-
+# --- Every value of a config, with its origin: a line of the file, `--set`, or the default
 
 DEFAULT = "default"
 """The origin of what neither the config nor the command line says."""

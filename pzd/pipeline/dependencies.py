@@ -1,4 +1,9 @@
-"""What a stage depends on, each part as a hash; and what of it has changed."""
+"""What a stage depends on, each part as a hash; and what of it has changed.
+
+Its code counts: edit an equation, and what depends on it runs again. Followed are the imports of the stage's module,
+wherever they stand in a file, those of what it imports, and so on. Nothing is imported for it, as numba and scipy take a
+second that a run in which all is fresh does not have.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +27,7 @@ from pzd.runs import Run, file_hash, versions
 from pzd.schema.errors import FilesError
 from pzd.schema.validate import read_json_list
 
-# ----------------------------------------------------------------------------------------------------
-# The source code that a stage may use, as one hash: edit an equation, and what depends on it runs again.
-#
-# Followed are the imports of the stage's module, wherever they stand in a file, and those of what it
-# imports, and so on. Nothing is imported for it, as numba and scipy take a second that a run in which
-# all is fresh does not have.
-
+# --- The source code that a stage may use, as one hash
 
 PACKAGE = Path(pzd.__file__).parent
 _TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t].*\n|\n)+", re.MULTILINE)
@@ -142,8 +141,7 @@ def _data(folder: Path) -> Iterator[Path]:
             yield path
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Everything that a stage depends on
 
 _WORDS = {"code": "the code", "marks": "what is not to be trusted"}
 """How a line calls what has a short name."""

@@ -17,9 +17,6 @@ from pzd.runs import Run, StageFolder
 from pzd.schema.errors import UserError
 from pzd.schema.yamlfile import yaml_text
 
-# ----------------------------------------------------------------------------------------------------
-
-
 Say = Callable[[str], None]
 
 
@@ -193,9 +190,7 @@ def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:
     return None
 
 
-# ----------------------------------------------------------------------------------------------------
-# Stages of a config that follow one another in memory: for many runs of which each differs a little.
-
+# --- In memory, without files: for many runs of which each differs a little
 
 Made = TypeVar("Made", Rig, Identified, Diagnosed, Rides)
 

@@ -1,4 +1,4 @@
-"""What runs ask of the disk: contents as hashes, writes that hold, refusals as one line; and versions."""
+"""What runs ask of the disk: hashes of files, writes that hold, refusals as one line, a lock; and versions."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pzd.schema.errors import FilesError
-
-# ----------------------------------------------------------------------------------------------------
-
 
 _SETTLED_NS = 100_000_000
 """Age from which a file's time of change tells one content from the next: file systems round it to about 10 ms."""
@@ -82,9 +79,7 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-# ----------------------------------------------------------------------------------------------------
-# One command at a time on a run: the lock that a command holds on the run's folder.
-
+# --- One command at a time on a run: the lock on its folder
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
