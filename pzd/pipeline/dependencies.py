@@ -1,8 +1,8 @@
 """What a stage depends on, each part as a hash; and what of it has changed.
 
 Its code counts: edit an equation, and what depends on it runs again. Followed are the imports of the stage's module,
-wherever they stand in a file, those of what it imports, and so on. Nothing is imported for it, as numba and scipy take a
-second that a run in which all is fresh does not have.
+wherever they stand in a file, those of what it imports, and so on. Nothing is imported for it, as numba and scipy take
+a second that a run in which all is fresh does not have.
 """
 
 from __future__ import annotations
