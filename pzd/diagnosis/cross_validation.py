@@ -17,13 +17,13 @@ import numpy as np
 from pzd.artefacts import HeldOutTest, HeldOutVoltage, Prediction
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage, with_rows
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
-from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit
+from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.thresholds import INTERPOLATION_ERROR_RATIO, PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
@@ -174,7 +174,7 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
 
     tests = len(one.records)
     return _error_is_larger(
-        one, other, float(stdtrit(tests - 1, ndtr(PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
+        one, other, float(stdtrit(tests - 1, ndtr(thresholds.PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
     )
 
 
@@ -184,7 +184,7 @@ def predicts_better(one: PredictionError, other: PredictionError) -> bool:
     Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
     verdict, and nothing speaks against it.
     """
-    return _error_is_larger(other, one, PREDICTION_STANDARD_ERRORS)
+    return _error_is_larger(other, one, thresholds.PREDICTION_STANDARD_ERRORS)
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
@@ -213,7 +213,8 @@ def standard_error(differences: Array) -> float:
 
 def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts the tests of a left-out voltage visibly worse than another, and by half or more."""
-    return other.visibly_below(one) and (one.criterion or 0.0) > INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
+    much = thresholds.INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
+    return other.visibly_below(one) and (one.criterion or 0.0) > much
 
 
 # --- Cross-validation of a damper
@@ -281,7 +282,7 @@ class CrossValidation(Folds):
         the least-squares problem and its solution; None where nothing is left to fit
         """
         problem = self._criterion_problem(damper)(held_out)
-        return None if problem is None else (problem, _fit(problem, damper))
+        return None if problem is None else (problem, refit(problem, damper))
 
     def worse_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
         """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it."""
@@ -454,16 +455,11 @@ def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_
     return replace(problem, observations=tuple(kept)) if kept else None
 
 
-def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
-    """Refit a damper from its present parameters."""
-    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
-
-
 def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
     """Refit a damper, without the base rows for which no test is left."""
     if problem is None:
         return None
-    found, rows = _fit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
+    found, rows = refit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
     return found if -1 in rows else with_rows(found, [found.base[i] for i in sorted(rows)])
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Gap, Region
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.data import PreparedRecord, Split
 from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
-from pzd.diagnosis.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
@@ -101,7 +101,7 @@ def _mains(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array:
     """Estimate the (n,) mains hum in the force [N]; it nearly repeats from cycle to cycle, as a gap does."""
     record, run = prepared.record, prepared.cycles
     peak = float(np.max(np.abs(record.force)))
-    return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
+    return hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
@@ -139,7 +139,7 @@ def _check_cycles(
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
-    if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
+    if trend is not None and trend < thresholds.CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
         prepared, mask, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None

@@ -36,7 +36,7 @@ from pzd.diagnosis.data import (
     split,
     unsaturated_records,
 )
-from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, standard_errors
+from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions
 from pzd.diagnosis.hypotheses import hypotheses
@@ -300,6 +300,6 @@ def held_out_gap(selection: Selection, validation: CrossValidation | None = None
     not_training = [~mask for mask in campaign.in_role(TRAINING)]
     found = None if validation is None else validation.fit_by_criterion(selection.fitted.damper, not_training)
     training = selection.final_evidence.halves[0]
-    adopted = found[1] if found else fit(training, selection.adopted, training.start_with(selection.fitted.damper))
+    adopted = found[1] if found else refit(training, selection.fitted.damper)
     after = held_out_criterion(campaign.held_out_checks(adopted.damper), campaign.split)
     return after.model_copy(update={"before": before.before})

@@ -12,9 +12,10 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import FitResult, fit, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import (
     MAY_BE_CHANCE,
@@ -42,7 +43,6 @@ from pzd.diagnosis.search.candidates import (
     nearly_as_good,
     per_voltage_candidates,
 )
-from pzd.diagnosis.thresholds import CONVERGED_CHANGE, LARGEST_GAP_GROWTH, MOST_REWEIGHTINGS
 
 
 def reweighted(
@@ -58,11 +58,11 @@ def reweighted(
     evidence : of the present optimum
     current : optimum with the adopted effects
     """
-    for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
+    for _ in range(thresholds.MOST_REWEIGHTINGS if current.effects else 0):
         before, evidence = current, weigh(current.damper)
-        current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
+        current = refit(evidence.whole, before.damper)
         moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
-        if np.all(moved <= CONVERGED_CHANGE * standard_errors(current)):
+        if np.all(moved <= thresholds.CONVERGED_CHANGE * standard_errors(current)):
             break
     return evidence, current
 
@@ -180,13 +180,13 @@ class _ForwardSelection:
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        effects, damper = self.current.effects, self.current.damper
+        damper = self.current.damper
         kept = {"effects": damper.effects, "zero_m": damper.zero_m}
         whole = self.weigh(self.identified.model_copy(update=kept)).whole
         pooled = whole.pooled_temperatures()
-        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, pooled))
+        rows, one = (refit(problem, damper) for problem in (whole, pooled))
         pays = delta_bic(one, rows)
-        if pays <= self.config.adopt_bic and not effects:
+        if pays <= self.config.adopt_bic and not damper.effects:
             drifts = tuple(name for name, effect in library().items() if effect.place == "material")
             tried = candidates(pooled, one, (*self.config.forbid, *drifts), self.jobs)
             pays -= min((c.delta_bic for c in tried), default=0.0)
@@ -243,8 +243,7 @@ class _ForwardSelection:
         reason = leaves_gap(evidence, self.config, before, each)
         if reason is None or each.varies:
             return reason
-        whole = self.weigh(each.fitted.damper).whole
-        again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
+        again = refit(self.weigh(each.fitted.damper).whole, each.fitted.damper)
         return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
@@ -266,7 +265,7 @@ class _ForwardSelection:
     def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
         """Return the effect that is supported together with another, what else was tried, and what was refused."""
         evidence = self.weigh(lead.fitted.damper)
-        at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
+        at = refit(evidence.whole, lead.fitted.damper)
         seconds = self._candidates(evidence, at)
         best = next((c for c in seconds if self._reason_against(evidence, at, c) is None), None)
         if best is None:
@@ -293,11 +292,9 @@ class _ForwardSelection:
     def _reweight(self, found: FitResult) -> None:
         """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap."""
         self.evidence = self.weigh(found.damper)
-        whole = self.evidence.whole
-        start = whole.start_with(found.damper)
-        self.current = fit(whole, found.effects, start)
-        if self._gap(self.current) > max(LARGEST_GAP_GROWTH * self._gap(found), self.config.negligible):
-            self.current = fit(whole, found.effects, start, evaluations=1)
+        self.current = refit(self.evidence.whole, found.damper)
+        if self._widens_gap(self.current, found):
+            self.current = refit(self.evidence.whole, found.damper, evaluations=1)
 
     def swap(self) -> None:
         """Repeat the step of each effect adopted before the last, and keep what does better."""
@@ -318,17 +315,16 @@ class _ForwardSelection:
     def reweight_until_stable(self) -> None:
         """Iterate fit and weights until no parameter moves, unless that widens the gap."""
         evidence, current = reweighted(self.weigh, self.evidence, self.current)
-        if self._gap(current) <= max(LARGEST_GAP_GROWTH * self._gap(self.current), self.config.negligible):
+        if not self._widens_gap(current, self.current):
             self.evidence, self.current = evidence, current
 
-    def _gap(self, fitted: FitResult) -> float:
-        return self.evidence.gap(fitted)
+    def _widens_gap(self, fitted: FitResult, before: FitResult) -> bool:
+        most = thresholds.LARGEST_GAP_GROWTH * self.evidence.gap(before)
+        return self.evidence.gap(fitted) > max(most, self.config.negligible)
 
     def _without(self, effect: str) -> FitResult:
         """Fit without one of the adopted effects."""
-        whole, damper = self.evidence.whole, self.current.damper
-        effects = {name: values for name, values in damper.effects.items() if name != effect}
-        return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
+        return refit(self.evidence.whole, self.current.damper.without_effects(effect))
 
     def competing_confounders(self) -> tuple[ConfounderMatch, ...]:
         """Return the confounders that would do as well as an adopted effect, in its place."""
