@@ -406,8 +406,7 @@ def _gaps_given_other(records: Sequence[NoiseFreeRecord], damper: Damper) -> dic
     """Return for each of several effects the gap that it leaves where the others are known."""
     if len(damper.effects) < 2:
         return {}
-    others = {name: {key: v for key, v in damper.effects.items() if key != name} for name in damper.effects}
-    return {name: gap_after_refit(records, damper.model_copy(update={"effects": others[name]})) for name in others}
+    return {name: gap_after_refit(records, damper.without_effects(name)) for name in damper.effects}
 
 
 # --- Cases of the second generator ---

@@ -49,6 +49,11 @@ class Folds:
     folds: tuple[tuple[Mask, ...], ...]
     """Held-out samples of each fold, one mask (n,) per record."""
 
+    @property
+    def no_samples(self) -> tuple[Mask, ...]:
+        """Masks (n,), one per record, that hold out no sample."""
+        return tuple(np.zeros_like(mask) for mask in self.folds[0])
+
 
 def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     """Assign the tests of each voltage to folds in turn, so that each fold holds out some tests of each voltage.
@@ -173,9 +178,8 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
     from scipy.special import ndtr, stdtrit
 
     tests = len(one.records)
-    return _error_is_larger(
-        one, other, float(stdtrit(tests - 1, ndtr(thresholds.PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
-    )
+    errors = float(stdtrit(tests - 1, ndtr(thresholds.PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
+    return _error_is_larger(one, other, errors)
 
 
 def predicts_better(one: PredictionError, other: PredictionError) -> bool:
@@ -239,11 +243,6 @@ class CrossValidation(Folds):
     """As identify found it from all tests."""
     visible: float
     """A gap (r.m.s.) below this share of a test's peak force does not count."""
-
-    @property
-    def no_samples(self) -> tuple[Mask, ...]:
-        """Masks (n,), one per record, that hold out no sample."""
-        return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.campaign.prepared)
 
     def baseline_error(self) -> PredictionError:
         """Compute the held-out prediction error of the baseline, refitted by criterion (4) as identify fits it."""

@@ -79,7 +79,9 @@ def check_residual(
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
     mask = wanted & comparable_samples(prepared)
-    mains = _mains(prepared, residual, mask)
+    run, peak = prepared.cycles, float(np.max(np.abs(record.force)))
+    # The mains nearly repeat from cycle to cycle, as a gap does.
+    mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
     variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
@@ -95,13 +97,6 @@ def check_residual(
     else:
         found = _check_samples(prepared, mask, residual, explained, predicted)
     return replace(found, hum=float(np.max(np.abs(mains))))
-
-
-def _mains(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array:
-    """Estimate the (n,) mains hum in the force [N]; it nearly repeats from cycle to cycle, as a gap does."""
-    record, run = prepared.record, prepared.cycles
-    peak = float(np.max(np.abs(record.force)))
-    return hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
@@ -172,9 +167,8 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
 def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
     """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
     folded = _folded(prepared, residual, mask)
-    if folded is not None:
-        return float(np.mean(np.diff(folded, axis=0) ** 2) / 2.0)
-    return float(np.mean(np.diff(residual[mask]) ** 2) / 2.0)
+    steps = np.diff(residual[mask]) if folded is None else np.diff(folded, axis=0)
+    return float(np.mean(steps**2) / 2.0)
 
 
 def _trend_power(folded: Array, error: PureError) -> float:
@@ -321,20 +315,16 @@ def _points(check: ResidualCheck) -> dict[str, Array]:
     The density is the squared residual less its share of noise; it sums to the gap.
     """
     record, run = check.prepared.record, check.prepared.cycles
+    names = ("velocity", "displacement", "acceleration")
     if check.folded is None or run is None:
         keep = check.wanted
-        names = ("velocity", "displacement", "acceleration")
         motion = {name: getattr(record, name)[keep] for name in names}
         density = (check.cleared**2 - check.variance if check.explained is None else check.explained)[keep]
         voltage = record.voltage[keep] if record.voltage is not None else np.full(density.size, np.nan)
         return {**motion, "density": density, "weight": np.ones(density.size), "voltage": voltage}
     count = check.folded.shape[0]
     mean = check.folded.mean(axis=0)
-    motion = {
-        "velocity": run.mean(record.time, record.velocity),
-        "displacement": run.mean(record.time, record.displacement),
-        "acceleration": run.mean(record.time, record.acceleration),
-    }
+    motion = {name: run.mean(record.time, getattr(record, name)) for name in names}
     voltage = np.full(mean.size, record.median_voltage() if record.voltage is not None else np.nan)
     density = count * (mean**2 - check.variance / count)
     return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}

@@ -264,18 +264,16 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
     fitted, whole = selection.fitted, selection.final_evidence.whole
     compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
     rows = []
-    for place, (row, widths) in enumerate(
-        zip(fitted.damper.base, base_half_widths(fitted, whole.scales.force), strict=True)
-    ):
+    half_widths = base_half_widths(fitted, whole.scales.force)
+    for place, (row, widths) in enumerate(zip(fitted.damper.base, half_widths, strict=True)):
         mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
         measured = np.concatenate([m for m, _ in mine])
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
+        scales = parameter_scales(parameters, measured).tolist()
         evidence = [
             ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
-            for name, scale, width in zip(
-                PARAMETER_NAMES, parameter_scales(parameters, measured).tolist(), widths.tolist(), strict=True
-            )
+            for name, scale, width in zip(PARAMETER_NAMES, scales, widths.tolist(), strict=True)
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)
         rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals)))

@@ -209,8 +209,7 @@ def auxiliary_start(objective: Objective) -> Array:
     terms = np.column_stack([columns, np.sign(speed), speed])
     size = np.linalg.norm(terms, axis=0)
     size[size == 0.0] = 1.0
-    found: Array = (np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2]
-    return found
+    return np.asarray((np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2])
 
 
 def without_auxiliary_force(objective: Objective, values: Array) -> Objective:

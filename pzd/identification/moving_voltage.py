@@ -296,14 +296,17 @@ class MovingObjective:
 
     def residuals(self, free: Sequence[Bingham]) -> Array:
         """Compute the measured less simulated force (N,) at the counted samples [N]."""
-        values = dict(self.fixed) | dict(zip(self.free, free, strict=True))
-        damper = damper_with_nodes(self.nodes, [values[i] for i in range(self.nodes.size)])
+        values = self.fixed | dict(zip(self.free, free, strict=True))
+        rows = (
+            BaseRow(voltage_V=float(self.nodes[i]), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
+            for i, p in sorted(values.items())
+        )
+        damper = Damper(base=tuple(rows))
         forces = [
             respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
             for r, t, (motion, places) in zip(self.records, self.constant.prepared, self._motions, strict=True)
         ]
-        residuals: Array = self.constant.measured - np.concatenate(forces)
-        return residuals
+        return np.asarray(self.constant.measured - np.concatenate(forces))
 
     def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
         """Compute the derivatives (N, 3 f) of the force by T0, C, k of each free node, by difference quotients."""
@@ -321,15 +324,6 @@ class MovingObjective:
         """Return the share (N, m) of each node in the parameters at the counted samples."""
         pairs = zip(self.records, self.constant.prepared, strict=True)
         return np.concatenate([node_weights(self.nodes, voltage_of(r)[t.counted]) for r, t in pairs])
-
-
-def damper_with_nodes(nodes: Array, values: Sequence[Bingham]) -> Damper:
-    """Return the Bingham damper with these parameters at these voltages."""
-    rows = (
-        BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
-        for u, p in zip(nodes, values, strict=True)
-    )
-    return Damper(base=tuple(rows))
 
 
 def motion_of(record: Record) -> tuple[Motion, Rows]:

@@ -196,8 +196,7 @@ def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
         others = np.delete(np.arange(size.size), j)
         solved = np.linalg.lstsq(gram[np.ix_(others, others)], gram[others, j], rcond=1e-12)[0]
         shares[j] = np.sqrt(max(float(gram[j, j] - gram[others, j] @ solved), 0.0)) * size[j]
-    result: Array = shares / np.sqrt(energy)
-    return result
+    return np.asarray(shares / np.sqrt(energy))
 
 
 def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
@@ -205,8 +204,7 @@ def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
     size = np.linalg.norm(slopes, axis=0) * np.sqrt(residuals @ residuals)
     if float(residuals @ residuals) <= EXACT_FIT * energy:
         return np.zeros(size.size)
-    cosines: Array = np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0)
-    return cosines
+    return np.asarray(np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0))
 
 
 def displacement_noise(displacement: Array) -> float:

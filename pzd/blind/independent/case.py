@@ -307,7 +307,8 @@ def gap_after_refit(
     groups = _groups([0.0] * len(tests) if temperatures is None else temperatures)
     for i, value in enumerate(values):
         for group in groups:
-            own = [tests[j] for j in group if _is_constant_at(tests[j][0], value)]
+            in_group = (tests[j] for j in group)
+            own = [(m, f) for m, f in in_group if m.test.signal == "constant" and m.test.value == value]
             if not own:
                 continue
             z, residual = _refit(own, (base.T0[i], base.C[i], base.k[i]), known)
@@ -320,10 +321,6 @@ def gap_after_refit(
             residual = _residual(m, f, (T0, C, k), known)
             squares, count = squares + float(residual @ residual), count + residual.size
     return float(np.sqrt(squares / count))
-
-
-def _is_constant_at(motion: Driven, value: float) -> bool:
-    return motion.test.signal == "constant" and motion.test.value == value
 
 
 def _groups(temperatures: Sequence[float]) -> list[list[int]]:

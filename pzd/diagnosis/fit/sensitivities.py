@@ -57,11 +57,8 @@ class KernelInputs:
 
     def difference_to(self, other: KernelInputs) -> Array:
         """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
-        mine, others = (
-            (self.at_nodes, other.at_nodes)
-            if self.effective_voltage is other.effective_voltage
-            else (self.rows, other.rows)
-        )
+        same_voltage = self.effective_voltage is other.effective_voltage
+        mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
         shape = np.broadcast_shapes(mine.shape, others.shape)
         return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
@@ -71,11 +68,9 @@ class KernelInputs:
 
     def parallel_force(self, o: WeightedRecord) -> Array:
         """Compute the (m,) parallel force [N]; (1,) a zero without any."""
-        return (
-            np.zeros(1)
-            if self.parallel is None
-            else parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
-        )
+        if self.parallel is None:
+            return np.zeros(1)
+        return parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
 
 
 def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
@@ -140,11 +135,6 @@ def search_directions(
     return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
 
 
-def independent_of_temperature(point: Point) -> bool:
-    """Whether observations of one base row share their kernel inputs: nothing depends on the temperature of each."""
-    return all(known()[name].place != "material" for name in point.effects)
-
-
 def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
     """Compute the force at the compared samples of an observation and its derivatives along some directions.
 
@@ -180,9 +170,8 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
     shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
-            shown[:, 1 + j] += (
-                o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
-            ) / width
+            change = o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
+            shown[:, 1 + j] += change / width
     compared = o.at_compared(shown)
     return compared[:, 0], compared[:, 1:]
 
@@ -287,11 +276,8 @@ def _sensitivities_at(
     """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
     low, high = limits
     free = low.size
-    point, below, above = (
-        problem.point(x, unknowns),
-        np.maximum(x[:free] - STEP, low),
-        np.minimum(x[:free] + STEP, high),
-    )
+    point = problem.point(x, unknowns)
+    below, above = np.maximum(x[:free] - STEP, low), np.minimum(x[:free] + STEP, high)
 
     def moved(j: int, value: float) -> Point:
         return problem.point(np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns)
@@ -299,7 +285,8 @@ def _sensitivities_at(
     columns_wanted = range(free) if wanted is None else wanted
     neighbours = {j: (moved(j, below[j]), moved(j, above[j]), float(above[j] - below[j])) for j in columns_wanted}
     # Observations of one base row share their directions, unless a material effect goes by the temperature of each.
-    shared, cached = independent_of_temperature(point), dict[int, SearchDirections]()
+    shared = all(known()[name].place != "material" for name in point.effects)
+    cached = dict[int, SearchDirections]()
     for o in problem.observations:
         columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)
         if o.base_row not in cached or o.base_row < 0 or not shared:
