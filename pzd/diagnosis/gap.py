@@ -15,16 +15,9 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.data import PreparedRecord, Split
 from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
 from pzd.record import Array, Mask
+from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
-from pzd.signals.lack_of_fit import (
-    TREND_CYCLES,
-    TREND_HARMONICS,
-    fit_smooth_residual,
-    p_value_of_trend,
-    p_values_by_harmonics,
-    pooled_p_value,
-)
 from pzd.signals.measures import reversals
 from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
@@ -129,8 +122,8 @@ def _check_cycles(
     by_displacement: Array | float,
 ) -> ResidualCheck:
     error = replace(pure_error(folded), shared=by_displacement)
-    trend = p_value_of_trend(folded)
-    probability = {"harmonics": p_values_by_harmonics(error)}
+    trend = lack_of_fit.p_value_of_trend(folded)
+    probability = {"harmonics": lack_of_fit.p_values_by_harmonics(error)}
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
@@ -144,7 +137,7 @@ def _check_cycles(
 def _check_samples(
     prepared: PreparedRecord, mask: Mask, residual: Array, nuisances: Array, predicted: Array
 ) -> ResidualCheck:
-    fit = fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
+    fit = lack_of_fit.fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
     left = (residual - nuisances)[mask] - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)
@@ -174,9 +167,9 @@ def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) 
 def _trend_power(folded: Array, error: PureError) -> float:
     """Compute the mean square of a steady change from cycle to cycle, less its share of noise [N^2]."""
     count, points = folded.shape
-    if count < TREND_CYCLES:
+    if count < lack_of_fit.TREND_CYCLES:
         return 0.0
-    last = min(TREND_HARMONICS, harmonics_of(points))
+    last = min(lack_of_fit.TREND_HARMONICS, harmonics_of(points))
     order = np.arange(count) - (count - 1) / 2.0
     coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
     slopes = np.abs(order @ coefficients / (order @ order)) ** 2 - error.single[: last + 1] / (order @ order)
@@ -242,9 +235,8 @@ def _by_block(check: ResidualCheck, values: Array) -> Array:
 def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
     """Compute the probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for c in checks for kind in c.probability}
-    return min(
-        1.0, *(len(kinds) * pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds)
-    )
+    pooled = [lack_of_fit.pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds]
+    return min(1.0, *(len(kinds) * p for p in pooled))
 
 
 def visible_gap(checks: Sequence[ResidualCheck]) -> float:

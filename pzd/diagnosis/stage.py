@@ -23,30 +23,17 @@ from pzd.artefacts import (
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.diagnosis import data, next_test
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.campaign import Campaign, Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
-from pzd.diagnosis.data import (
-    TRAINING,
-    PreparedRecord,
-    centred_on,
-    prepare,
-    saturation_note,
-    split,
-    unsaturated_records,
-)
+from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions
 from pzd.diagnosis.hypotheses import hypotheses
-from pzd.diagnosis.next_test import (
-    OperatingEnvelope,
-    intermediate_voltage_test,
-    operating_envelope,
-    repeated_longest_test,
-    separating_test,
-)
+from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.verdict import (
@@ -100,16 +87,16 @@ def diagnose(
     """
     if identified.knees.law_of(setting) == "knee":
         return knee_verdict(identified, setting, diagnose)
-    records, saturated = unsaturated_records(rig, setting)
-    recorded = prepare(records)
+    records, saturated = data.unsaturated_records(rig, setting)
+    recorded = data.prepare(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
-    prepared = centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
-    roles = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
+    prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
+    roles = data.split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     baseline = base_of(identified.rows, setting)
     campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
-    envelope = operating_envelope(stand.limits, recorded, voltages)
+    envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
     validation = cross_validation_of(campaign, baseline, diagnose.visible)
@@ -118,11 +105,11 @@ def diagnose(
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
-    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), saturation_note(saturated), _hum(before)
+    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), data.saturation_note(saturated)
     final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason="".join((decision.reason, campaign.budget.note, *limits)),
+        reason="".join((decision.reason, campaign.budget.note, *limits, _hum(before))),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),
@@ -164,12 +151,12 @@ def _next_test(
     if selection.rival_dampers:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rival_dampers]
         offsets = [campaign.offset(damper) for _, damper in selection.rival_dampers]
-        return separating_test(rivals, envelope, temperature, offsets)
+        return next_test.separating_test(rivals, envelope, temperature, offsets)
     if decision.doubtful:
-        return repeated_longest_test(recorded, envelope)
+        return next_test.repeated_longest_test(recorded, envelope)
     offset = campaign.offset(final.moved(-zero) if selection.adopted else final)
     errors = adoption.error, adoption.interpolation_error
-    return intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
+    return next_test.intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
 
 
 # --- Entries of the files: ranking, parameters with intervals, and the held-out gap

@@ -19,15 +19,8 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion, parts_of_steps
-from pzd.identification.bingham_fit import (
-    TOLERANCE,
-    Bingham,
-    Objective,
-    fit_separable,
-    from_search,
-    search_slopes,
-    to_search,
-)
+from pzd.identification import bingham_fit
+from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
 from pzd.identification.condition import parameter_rows
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.prepared_record import fitted_records, prepare
@@ -157,7 +150,7 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     low, high = (np.tile(b, len(starts)) for b in objective.constant.search_bounds)
 
     def parameters(x: Array) -> list[Bingham]:
-        return [from_search(part, stroke) for part in x.reshape(-1, 3)]
+        return [bingham_fit.from_search(part, stroke) for part in x.reshape(-1, 3)]
 
     def residuals_at(x: Array) -> Array:
         return np.asarray(objective.residuals(parameters(x)) / norm)
@@ -165,19 +158,19 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     def slopes_at(x: Array) -> Array:
         free = parameters(x)
         slopes = objective.slopes(free, objective.residuals(free))
-        inner = [slopes[:, 3 * i : 3 * i + 3] @ search_slopes(p, stroke) for i, p in enumerate(free)]
+        inner = [slopes[:, 3 * i : 3 * i + 3] @ bingham_fit.search_slopes(p, stroke) for i, p in enumerate(free)]
         return np.asarray(-np.hstack(inner) / norm)
 
-    start = np.concatenate([to_search(s, stroke) for s in starts])
+    start = np.concatenate([bingham_fit.to_search(s, stroke) for s in starts])
     found = least_squares(
         residuals_at,
         np.clip(start, low + 1e-9, high - 1e-9),
         jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
-        xtol=TOLERANCE**0.75,
-        ftol=TOLERANCE**0.75,
-        gtol=TOLERANCE,
+        xtol=bingham_fit.TOLERANCE**0.75,
+        ftol=bingham_fit.TOLERANCE**0.75,
+        gtol=bingham_fit.TOLERANCE,
         max_nfev=60,
     )
     return parameters(found.x)

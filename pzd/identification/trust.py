@@ -41,16 +41,6 @@ EXACT_FIT = 1e-14
 
 
 @dataclass(frozen=True)
-class Trust:
-    """Status of one row of parameters."""
-
-    status: str
-    """`ok`, or `weak: ...`, `undetermined: ...` with the reason."""
-    determined: tuple[bool, ...]
-    """Whether each parameter is determined, so that its value is shown."""
-
-
-@dataclass(frozen=True)
 class ParameterEvidence:
     """Evidence of the data on one parameter."""
 
@@ -96,13 +86,19 @@ class ParameterEvidence:
         return SENSOR_ERROR / self.sensitivity if self.sensitivity > 0.0 else np.inf
 
 
-def trust_of(evidence: Sequence[ParameterEvidence]) -> Trust:
-    """Derive the status of a row from the evidence on its parameters."""
+def trust_of(evidence: Sequence[ParameterEvidence]) -> tuple[str, tuple[bool, ...]]:
+    """Derive the status of a row from the evidence on its parameters.
+
+    Returns
+    -------
+    `ok`, or `weak: ...`, `undetermined: ...` with the reason; and whether each parameter is determined, so that its
+    value is shown
+    """
     reasons = [e.undetermined() for e in evidence]
     weak = [None if reason else e.weak() for e, reason in zip(evidence, reasons, strict=True)]
     names = [e.name for e in evidence]
     clauses = [_clause("undetermined", names, reasons), _clause("weak", names, weak)]
-    return Trust("; ".join(clause for clause in clauses if clause) or "ok", tuple(reason is None for reason in reasons))
+    return "; ".join(clause for clause in clauses if clause) or "ok", tuple(reason is None for reason in reasons)
 
 
 def _clause(word: str, names: Sequence[str], reasons: Sequence[str | None]) -> str:

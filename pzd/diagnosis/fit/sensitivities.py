@@ -9,17 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.damper import parameter_rows
 from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
-from pzd.damper.parameter_rows import (
-    constant_rows,
-    drive_row_of,
-    element_rows,
-    material_factors,
-    parallel_rows,
-    rows_along,
-)
 from pzd.damper.path import Variables
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
 from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
@@ -53,7 +46,7 @@ class KernelInputs:
     def _interpolated(self, at_nodes: Array) -> Array:
         if self.nodes is None or self.effective_voltage is None:
             return at_nodes
-        return rows_along(self.nodes, at_nodes, self.effective_voltage)
+        return parameter_rows.rows_along(self.nodes, at_nodes, self.effective_voltage)
 
     def difference_to(self, other: KernelInputs) -> Array:
         """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
@@ -81,12 +74,13 @@ def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
 def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     friction, damping, stiffness = point.base[o.base_row]
     effects = point.effects_at(o.base_row)
-    rows, parallel = constant_rows(friction, damping, stiffness, effects)
+    rows, parallel = parameter_rows.constant_rows(friction, damping, stiffness, effects)
     places = {name: known()[name].place for name in effects}
     acting = {name: values for name, values in effects.items() if places[name] == "material"}
     if acting:
         given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
-        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference_temperature)
+        temperature = constant_value(o.motion.temperature)
+        factors = parameter_rows.material_factors(given, temperature, point.problem.reference_temperature)
         rows = np.repeat(rows, len(factors), axis=0)
         rows[:, : len(ELEMENT)] *= factors
     sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
@@ -95,10 +89,11 @@ def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
 
 def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     damper, temperature = point.damper, constant_value(o.motion.temperature)
-    effective = o.effective_voltage(drive_row_of(damper).tobytes())
-    parallel, sensors = parallel_rows(damper, effective), sensors_of(damper)
+    effective = o.effective_voltage(parameter_rows.drive_row_of(damper).tobytes())
+    parallel, sensors = parameter_rows.parallel_rows(damper, effective), sensors_of(damper)
     if temperature is not None and temperature.size > 1:
-        return KernelInputs(element_rows(damper, effective, temperature), parallel, sensors, point.displacement_zero)
+        rows = parameter_rows.element_rows(damper, effective, temperature)
+        return KernelInputs(rows, parallel, sensors, point.displacement_zero)
     nodes = point.nodes(None if temperature is None else float(temperature[0]))
     return KernelInputs(nodes.rows, parallel, sensors, point.displacement_zero, nodes.voltages, effective)
 

@@ -13,15 +13,8 @@ from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import (
-    LEVEL,
-    FitResult,
-    fit,
-    profiled_misfit,
-    projected_out,
-    refit,
-    standard_errors,
-)
+from pzd.diagnosis.fit import least_squares
+from pzd.diagnosis.fit.least_squares import LEVEL, FitResult
 from pzd.diagnosis.fit.likelihood import simulated_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
@@ -100,7 +93,7 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     if effect not in thresholds.NUISANCE_EFFECTS:
         return None
     sizes = []
-    for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
+    for unknown, error in zip(fitted.unknowns, least_squares.standard_errors(fitted), strict=True):
         if unknown.effect == effect and (unit := trivial_size(effect, unknown.parameter, force)) is not None:
             sizes.append((abs(unknown.value_in(fitted.damper)) / unit, LEVEL * error / unit))
     if not sizes or max(size - width for size, width in sizes) >= 1.0:
@@ -124,10 +117,10 @@ def spurious(
     halves = weighed.halves
     if any(not half.observations for half in halves):
         return None
-    fits = [refit(half, candidate.fitted.damper) for half in halves]
-    without = fit(evidence.halves[0], before.effects, before.optimum)
-    left = profiled_misfit(evidence.validation_problem(weighed), without.damper)
-    if profiled_misfit(halves[1], fits[0].damper) > left + config.rival_bic:
+    fits = [least_squares.refit(half, candidate.fitted.damper) for half in halves]
+    without = least_squares.fit(evidence.halves[0], before.effects, before.optimum)
+    left = least_squares.profiled_misfit(evidence.validation_problem(weighed), without.damper)
+    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
     if not _halves_agree(halves, (fits[0], fits[1]), fresh, thresholds.HALVES_LOSS * -candidate.delta_bic):
@@ -159,7 +152,7 @@ def _halves_agree(
     limit = 2.0 * float(chdtri(len(fits[0].unknowns), thresholds.HALVES_SIGNIFICANCE))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
         spread = max(1.0, own.misfit / max(own.size - own.optimum.size, 1))
-        if profiled_misfit(half, other.damper) - own.misfit <= max(limit * spread, negligible):
+        if least_squares.profiled_misfit(half, other.damper) - own.misfit <= max(limit * spread, negligible):
             return True
     return False
 
@@ -287,7 +280,7 @@ class _TangentSpace:
     def gap(self, simulated: Sequence[Array]) -> float:
         """Compute the r.m.s. change of the force that no other values of the present variables would bring about."""
         changed = (np.concatenate(simulated) - np.concatenate(self.before.simulated)) / self.units
-        return float(np.linalg.norm(projected_out(self.forces, changed)))
+        return float(np.linalg.norm(least_squares.projected_out(self.forces, changed)))
 
     def of_trace(self, effect: Effect, trace: Array) -> Detection | None:
         """Estimate the gap of an effect that was not searched for; None where it shows nowhere or is impossible.
@@ -311,7 +304,7 @@ class _TangentSpace:
         simulated = [simulated_force(o, damper) for o in problem.observations]
         left = [o.standardised(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
         residual = np.concatenate(before.residuals)
-        rest = projected_out(self.before.column_basis, np.concatenate(left) - residual)
+        rest = least_squares.projected_out(self.before.column_basis, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None

@@ -17,20 +17,8 @@ from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import FitResult, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.search.acceptance import (
-    MAY_BE_CHANCE,
-    MAY_BE_TEST_SCATTER,
-    ConfounderMatch,
-    Detection,
-    Selection,
-    SelectionStep,
-    closes_gap,
-    detections,
-    insufficient_support,
-    leaves_gap,
-    rivals_of,
-    spurious,
-)
+from pzd.diagnosis.search import acceptance
+from pzd.diagnosis.search.acceptance import ConfounderMatch, Detection, Selection, SelectionStep
 from pzd.diagnosis.search.candidates import (
     Candidate,
     as_candidate,
@@ -101,7 +89,8 @@ def swap_step(
     spurious_effects = frozenset(c.effect for c in close if refused(c))
     alike = [c for c in close if c.effect not in spurious_effects]
     kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
-    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), spurious_effects), kept
+    rivals = acceptance.rivals_of(kept, (*alike, own), config)
+    return SelectionStep(tuple(ended), kept.effect, rivals, spurious_effects), kept
 
 
 def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
@@ -232,7 +221,7 @@ class _ForwardSelection:
         return None
 
     def _reason_against(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
-        return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+        return acceptance.insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
     def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
         """Say why a candidate is spurious by the gap that it leaves, weighed by the residual without it and with it.
@@ -240,11 +229,11 @@ class _ForwardSelection:
         What is left without it is slow: with these weights the fit follows what is quick, where the displacement is
         known worst, and T0, C and k are bent.
         """
-        reason = leaves_gap(evidence, self.config, before, each)
+        reason = acceptance.leaves_gap(evidence, self.config, before, each)
         if reason is None or each.varies:
             return reason
         again = refit(self.weigh(each.fitted.damper).whole, each.fitted.damper)
-        return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
+        return acceptance.leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
@@ -253,7 +242,7 @@ class _ForwardSelection:
         lead = next(leads, None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
-            self.open_detections = detections(self.evidence.whole, self.current, tried)
+            self.open_detections = acceptance.detections(self.evidence.whole, self.current, tried)
             # Once noise explains what is left, the round that adopted something tells more of the others.
             self.steps += [SelectionStep(tried, None)] if tried and (missing or not self.steps) else []
             return False
@@ -271,9 +260,9 @@ class _ForwardSelection:
         if best is None:
             return None
         both = converged(evidence.whole, at, best)
-        if not closes_gap(self.evidence, self.config, self.current, both):
+        if not acceptance.closes_gap(self.evidence, self.config, self.current, both):
             return None
-        if spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
+        if acceptance.spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
             return None
         return both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds)
 
@@ -282,7 +271,7 @@ class _ForwardSelection:
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
             step = SelectionStep(finished, chosen.effect, rejected=refused)
-            self.steps.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
+            self.steps.append(replace(step, rivals=acceptance.rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
         self.choose_temperature_axis()
@@ -347,16 +336,17 @@ class _ForwardSelection:
             lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
-                    self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
-        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_TEST_SCATTER, MAY_BE_CHANCE))
+                    self.reasons[each.effect] = self._refused(lenient, each) or acceptance.MAY_BE_CHANCE
+        undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE
+        return tuple(name for name, why in self.reasons.items() if why in undecided)
 
     def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
         """Say why a candidate is too little, or spurious; None where the data support it by itself."""
         evidence, before = self.evidence, before or self.current
         return (
-            insufficient_support(evidence, config, each)
+            acceptance.insufficient_support(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
-            or spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
+            or acceptance.spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
         )
 
     def _drop_needless(self, effect: str, newest: str) -> None:
