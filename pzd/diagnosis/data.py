@@ -187,9 +187,8 @@ class AverageCycle:
     def of(cls, record: Record, run: Cycles) -> AverageCycle:
         """Average the cycles of a record, and estimate how well the average is known."""
         folded = run.fold(record.time, record.displacement)
-        creep = drift_over_cycles(
-            folded
-        )  # else a mean that walks would end every cycle with a step, which the oil spring feels
+        # A mean that walks would end every cycle with a step, which loads the oil spring.
+        creep = drift_over_cycles(folded)
         error = pure_error(folded - creep + creep.mean())
         finest = float(np.median(np.diff(np.unique(record.displacement))))
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0

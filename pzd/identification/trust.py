@@ -215,11 +215,12 @@ def displacement_noise(displacement: Array) -> float:
 
 def _doubt(left: float, misfit: Misfit) -> str | None:
     """Return the reason why all parameters are weak, however narrow their intervals: the model lacks something."""
-    missed = f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's"
-    much = f"the model leaves {left:.0%} of the force's r.m.s."
-    return (
-        "; ".join(words for words, true in ((missed, misfit.is_large), (much, left > LARGEST_RESIDUAL)) if true) or None
-    )
+    reasons = []
+    if misfit.is_large:
+        reasons.append(f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+    if left > LARGEST_RESIDUAL:
+        reasons.append(f"the model leaves {left:.0%} of the force's r.m.s.")
+    return "; ".join(reasons) or None
 
 
 def _not_converged(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:
