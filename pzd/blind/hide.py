@@ -15,14 +15,13 @@ import numpy as np
 from pzd.blind.case import CaseFiles, NoiseFreeRecord, Truth, write_noise_free
 from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.independent.case import HiddenLaws, IndependentCase, drawn_case
-from pzd.blind.independent.kernel import BinghamTable
 from pzd.blind.independent.outside import OUTSIDE
 from pzd.blind.outside import FORMS, Envelope
 from pzd.blind.plan import PlannedCase
 from pzd.damper.compose import respond
 from pzd.damper.effect import Scales, Strength
 from pzd.damper.effects import library
-from pzd.damper.model import BaseRow, Damper
+from pzd.damper.model import BaseRow, Damper, Effects
 from pzd.damper.motion import Motion
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
@@ -237,7 +236,7 @@ def with_effects(
     temperature = records[0].motion.temperature
     reference = float(temperature[0]) if drifts and temperature is not None else None
     base = baseline.model_copy(update={"reference_temperature_degC": reference})
-    effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
+    effects: Effects = {}
     for name, size in wanted.items():
         hiding = library()[name].hidden
         if hiding is None:
@@ -406,8 +405,7 @@ def _gaps_given_other(records: Sequence[NoiseFreeRecord], damper: Damper) -> dic
     """Return for each of several effects the gap that it leaves where the others are known."""
     if len(damper.effects) < 2:
         return {}
-    others = {name: {key: v for key, v in damper.effects.items() if key != name} for name in damper.effects}
-    return {name: gap_after_refit(records, damper.model_copy(update={"effects": others[name]})) for name in others}
+    return {name: gap_after_refit(records, damper.without_effects(name)) for name in damper.effects}
 
 
 # --- Cases of the second generator ---
@@ -434,6 +432,12 @@ def _independent_truth(case: IndependentCase, planned: PlannedCase, seed: int) -
     effects: HiddenLaws = {} if outside else case.laws
     peaks = [float(np.max(np.abs(test.true_force))) for test in case.tests]
     noise = [float(np.std(np.diff(t.force - t.true_force))) / np.sqrt(2.0) for t in case.tests]
+    base, controlled = case.base, len(case.base.values) > 1
+    rows = tuple(
+        BaseRow(voltage_V=value if controlled else None, T0_N=T0, C_Ns_per_m=C, k_N_per_m=k)
+        for value, T0, C, k in zip(base.values, base.T0, base.C, base.k, strict=True)
+    )
+    named: Effects = {name: dict(values) for name, values in effects.items()}
     return Truth(
         id=planned.id,
         seed=seed,
@@ -443,7 +447,7 @@ def _independent_truth(case: IndependentCase, planned: PlannedCase, seed: int) -
         form=form,
         form_values=dict(case.laws[form]) if form else {},
         described_by=OUTSIDE[form].described_by if form else (),
-        damper=_independent_damper(case.base, effects, case.reference_temperature),
+        damper=Damper(base=rows, effects=named, reference_temperature_degC=case.reference_temperature),
         sizes={},
         force_noise=max(n / p for n, p in zip(noise, peaks, strict=True)),
         noise_rho=0.0,
@@ -453,17 +457,4 @@ def _independent_truth(case: IndependentCase, planned: PlannedCase, seed: int) -
         lowest_peak_N=min(peaks),
         visible_gap=case.visible_gap,
         gap_given_other=dict(case.gap_given_other),
-    )
-
-
-def _independent_damper(base: BinghamTable, effects: HiddenLaws, reference: float | None) -> Damper:
-    controlled = len(base.values) > 1
-    rows = tuple(
-        BaseRow(voltage_V=value if controlled else None, T0_N=T0, C_Ns_per_m=C, k_N_per_m=k)
-        for value, T0, C, k in zip(base.values, base.T0, base.C, base.k, strict=True)
-    )
-    return Damper(
-        base=rows,
-        effects={name: dict(values) for name, values in effects.items()},
-        reference_temperature_degC=reference,
     )

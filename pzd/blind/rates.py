@@ -203,12 +203,9 @@ def rate_rows(cases: Iterable[Scored]) -> list[RateRow]:
             if (c.campaign, c.kind, low_noise(c)) == (campaign, kind, low) and start <= c.visible_gap < end
         ]
         if found:
-            rows.append(_row(campaign, kind, "to 1 %" if low else "above 1 %", _bin(start, end), found))
+            gap = f"{100 * start:g}-{100 * end:g}" if math.isfinite(end) else f"over {100 * start:g}"
+            rows.append(_row(campaign, kind, "to 1 %" if low else "above 1 %", gap, found))
     return rows
-
-
-def _bin(start: float, end: float) -> str:
-    return f"{100 * start:g}-{100 * end:g}" if math.isfinite(end) else f"over {100 * start:g}"
 
 
 _COUNTED: dict[str, Predicate] = {

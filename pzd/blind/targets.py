@@ -7,26 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from pzd.blind import rates
 from pzd.blind.case import Scored
-from pzd.blind.rates import (
-    CalibrationRow,
-    Predicate,
-    Rate,
-    ambiguous_with_truth,
-    brier_gain,
-    calibration_rows,
-    failed,
-    false_name,
-    low_noise,
-    right,
-    rightly_outside,
-    shape_found,
-    truth_among,
-    unexplained,
-    visible,
-    wrong_name,
-    wrong_single,
-)
+from pzd.blind.rates import CalibrationRow, Predicate, Rate
 from pzd.schema.model import Frozen
 
 FULL_BIN = 50
@@ -75,9 +58,9 @@ def campaign_lines(cases: Sequence[Scored]) -> list[Line]:
         seen, nothing, outside = _by_truth([c for c in cases if c.campaign == name])
         found += [
             rate_line(f"{name}, visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
-            rate_line(f"{name}, visible", "wrong name", seen, wrong_name, "<= 1 %"),
-            rate_line(f"{name}, no effect", "false names", nothing, false_name, "<= 1 %"),
-            rate_line(f"{name}, outside the library, visible", "unexplained", outside, unexplained, ">= 92 %"),
+            rate_line(f"{name}, visible", "wrong name", seen, rates.wrong_name, "<= 1 %"),
+            rate_line(f"{name}, no effect", "false names", nothing, rates.false_name, "<= 1 %"),
+            rate_line(f"{name}, outside the library, visible", "unexplained", outside, rates.unexplained, ">= 92 %"),
         ]
     return found
 
@@ -88,29 +71,31 @@ def independent_lines(cases: Sequence[Scored]) -> list[Line]:
     strict = [c for c in outside if not c.described_by]
     return [
         rate_line("visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
-        rate_line("visible", "right name", seen, right),
-        rate_line("visible", "wrong name", seen, wrong_name, "<= 1 %"),
-        rate_line("no effect", "false names", nothing, false_name, "<= 1 %"),
-        rate_line("outside the library, visible", "flagged, or rightly described", outside, rightly_outside, ">= 92 %"),
-        rate_line("outside, described by nothing", "unexplained", strict, unexplained),
-        rate_line("outside, described by nothing", "a wrong single name", strict, wrong_single),
+        rate_line("visible", "right name", seen, rates.right),
+        rate_line("visible", "wrong name", seen, rates.wrong_name, "<= 1 %"),
+        rate_line("no effect", "false names", nothing, rates.false_name, "<= 1 %"),
+        rate_line(
+            "outside the library, visible", "flagged, or rightly described", outside, rates.rightly_outside, ">= 92 %"
+        ),
+        rate_line("outside, described by nothing", "unexplained", strict, rates.unexplained),
+        rate_line("outside, described by nothing", "a wrong single name", strict, rates.wrong_single),
         *_gap_cuts(cases),
         *_calibration(cases),
-        rate_line("all", "failed", cases, failed),
+        rate_line("all", "failed", cases, rates.failed),
     ]
 
 
 def _by_truth(cases: Sequence[Scored]) -> tuple[list[Scored], list[Scored], list[Scored]]:
     """Return the cases with visible effects, those without an effect, and those with a visible form outside."""
     return (
-        [c for c in cases if c.truth and visible(c)],
+        [c for c in cases if c.truth and rates.visible(c)],
         [c for c in cases if not c.truth and c.kind != "outside"],
-        [c for c in cases if c.kind == "outside" and visible(c)],
+        [c for c in cases if c.kind == "outside" and rates.visible(c)],
     )
 
 
 def _right_or_ambiguous(case: Scored) -> bool:
-    return right(case) or ambiguous_with_truth(case)
+    return rates.right(case) or rates.ambiguous_with_truth(case)
 
 
 # --- Lines of rates ---
@@ -157,25 +142,25 @@ def _verdict(share: float | None, target: str) -> Met:
 def _selection(cases: Sequence[Scored]) -> Iterator[Line]:
     single = [c for c in cases if c.kind == "single" and c.truth]
     several = [c for c in single if not c.one_frequency]
-    seen = [c for c in several if visible(c)]
+    seen = [c for c in several if rates.visible(c)]
     for about, mine, targets in (
-        ("visible, noise to 1 %", [c for c in seen if low_noise(c)], (">= 95 %", "<= 1 %", ">= 98 %")),
-        ("visible, noise above 1 %", [c for c in seen if not low_noise(c)], ("", "", "")),
+        ("visible, noise to 1 %", [c for c in seen if rates.low_noise(c)], (">= 95 %", "<= 1 %", ">= 98 %")),
+        ("visible, noise above 1 %", [c for c in seen if not rates.low_noise(c)], ("", "", "")),
     ):
-        yield rate_line(about, "right name", mine, right, targets[0])
-        yield rate_line(about, "wrong name", mine, wrong_name, targets[1])
-        yield rate_line(about, "truth among effects and rivals", mine, truth_among, targets[2])
+        yield rate_line(about, "right name", mine, rates.right, targets[0])
+        yield rate_line(about, "wrong name", mine, rates.wrong_name, targets[1])
+        yield rate_line(about, "truth among effects and rivals", mine, rates.truth_among, targets[2])
     faint = [c for c in several if 0.0025 <= c.visible_gap < 0.005]
     with_truth = "right, or ambiguous with the truth"
     yield rate_line("gap 0.25-0.5 %", with_truth, faint, _right_or_ambiguous, ">= 60 %")
-    yield rate_line("gap 0.25-0.5 %", "wrong name", faint, wrong_name, "<= 3 %")
-    alone = [c for c in single if c.one_frequency and visible(c)]
-    yield rate_line("one frequency, visible", "wrong name", alone, wrong_name, "<= 2 %")
+    yield rate_line("gap 0.25-0.5 %", "wrong name", faint, rates.wrong_name, "<= 3 %")
+    alone = [c for c in single if c.one_frequency and rates.visible(c)]
+    yield rate_line("one frequency, visible", "wrong name", alone, rates.wrong_name, "<= 2 %")
     twins = [c for c in alone if set(c.truth) <= TWINS]
     yield rate_line(
-        "one frequency, spring or mass", "ambiguous with the truth", twins, ambiguous_with_truth, ">= 100 %"
+        "one frequency, spring or mass", "ambiguous with the truth", twins, rates.ambiguous_with_truth, ">= 100 %"
     )
-    pairs = [c for c in cases if c.kind == "pair" and len(c.truth) == 2 and visible(c)]
+    pairs = [c for c in cases if c.kind == "pair" and len(c.truth) == 2 and rates.visible(c)]
     yield rate_line("pairs, each visible given the other", "both found", pairs, _both_found, ">= 85 %")
 
 
@@ -185,29 +170,29 @@ def _both_found(case: Scored) -> bool:
 
 def _nothing_to_name(cases: Sequence[Scored]) -> Iterator[Line]:
     _, nothing, outside = _by_truth(cases)
-    yield rate_line("no effect", "false names", nothing, false_name, "<= 1 %")
-    yield rate_line("outside the library, visible", "a wrong single name", outside, wrong_single, "<= 3 %")
-    yield rate_line("outside the library, visible", "unexplained", outside, unexplained, ">= 92 %")
-    yield rate_line("outside the library, visible", "shape among the first two", outside, shape_found, ">= 60 %")
+    yield rate_line("no effect", "false names", nothing, rates.false_name, "<= 1 %")
+    yield rate_line("outside the library, visible", "a wrong single name", outside, rates.wrong_single, "<= 3 %")
+    yield rate_line("outside the library, visible", "unexplained", outside, rates.unexplained, ">= 92 %")
+    yield rate_line("outside the library, visible", "shape among the first two", outside, rates.shape_found, ">= 60 %")
 
 
 def _counts(cases: Sequence[Scored]) -> Iterator[Line]:
     wanted: dict[str, tuple[Callable[[Scored], bool], int]] = {
-        "with visible effects": (lambda c: c.kind in ("single", "pair") and visible(c), 600),
+        "with visible effects": (lambda c: c.kind in ("single", "pair") and rates.visible(c), 600),
         "with nothing": (lambda c: c.kind == "none", 400),
-        "with something visible outside the library": (lambda c: c.kind == "outside" and visible(c), 300),
+        "with something visible outside the library": (lambda c: c.kind == "outside" and rates.visible(c), 300),
     }
     for about, (hit, least) in wanted.items():
         count = sum(hit(case) for case in cases)
         yield _line(about, "cases", None, count, f">= {least}", "met" if count >= least else "missed")
-    yield rate_line("all", "failed", cases, failed)
+    yield rate_line("all", "failed", cases, rates.failed)
 
 
 # --- Lines of numbers ---
 
 
 def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
-    named = [c for c in cases if c.truth and right(c) and visible(c)]
+    named = [c for c in cases if c.truth and rates.right(c) and rates.visible(c)]
     for suffix, cuts, targets in (
         ("", [c.gap_cut for c in named], (">= 90 %", ">= 75 %")),
         (" of the truth, gains as fitted", [c.gap_cut_of_truth for c in named], ("", "")),
@@ -218,7 +203,7 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
             value = float(np.percentile(values, percentile)) if values else None
             figure = f"gap cut{suffix}, {words}"
             yield _line("rightly named, visible", figure, value, len(values), target, _verdict(value, target))
-    inside = [hit for c in cases if c.truth and visible(c) for hit in c.inside.values()]
+    inside = [hit for c in cases if c.truth and rates.visible(c) for hit in c.inside.values()]
     rate = Rate(sum(inside), len(inside))
     met: Met = "too few"
     if rate.share is not None and rate.count >= ENOUGH_PARAMETERS:
@@ -228,7 +213,7 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
 
 
 def _calibration(cases: Sequence[Scored]) -> Iterator[Line]:
-    for row in calibration_rows(cases):
+    for row in rates.calibration_rows(cases):
         if row.cases < FULL_BIN:
             yield _bin_line(row, "", "shown")
         else:
@@ -237,10 +222,10 @@ def _calibration(cases: Sequence[Scored]) -> Iterator[Line]:
     stated = sorted(c.confidence for c in cases if c.confidence is not None)
     if len(stated) >= len(FIFTHS) * FULL_FIFTH:
         limits = np.unique(np.quantile(stated, [0.0, *FIFTHS]))
-        for row in calibration_rows(cases, [float(limit) for limit in limits]):
+        for row in rates.calibration_rows(cases, [float(limit) for limit in limits]):
             inside = row.hit_low95 <= row.stated <= row.hit_high95
             yield _bin_line(row, "in its interval", "met" if inside else "missed")
-        gain, target = brier_gain(cases), ">= 20 %"
+        gain, target = rates.brier_gain(cases), ">= 20 %"
         figure = "mean square error below that of the best constant"
         yield _line("confidence", figure, gain, len(stated), target, _verdict(gain, target))
 

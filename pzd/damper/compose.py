@@ -7,18 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pzd.compiled import compiled
+from pzd.damper.compiled import kernels
 from pzd.damper.compiled.columns import DRIVE, NEUTRAL, PARALLEL, acting, columns_of, value_of
-from pzd.damper.compiled.kernels import (
-    T0,
-    C,
-    K,
-    branch_force,
-    branch_steady,
-    branches_follow,
-    no_effects,
-    parallel_forces,
-    row_of,
-)
+from pzd.damper.compiled.kernels import T0, C, K
 from pzd.damper.confounders import module_of
 from pzd.damper.effect import arguments, functions
 from pzd.damper.element import element_force, element_force_sensitivities
@@ -93,7 +84,7 @@ def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: f
     tolerance : admissible error of a piece, as a share of the force
     """
     x, v = motion.displacement, motion.velocity
-    if len(rows) == 1 and no_effects(row_of(rows[0])):
+    if len(rows) == 1 and kernels.no_effects(kernels.row_of(rows[0])):
         friction, damping, stiffness = rows[0, [T0, C, K]]
         return element_force(x, steps, friction, damping, stiffness, initial_force, v)
     return march(x, v, steps, rows, initial_force, tolerance)
@@ -116,7 +107,7 @@ def integrated_sensitivities(
     """
     columns, along, initial_slopes = variables
     x, v = motion.displacement, motion.velocity
-    if len(rows) == len(along) == 1 and no_effects(row_of(rows[0])) and np.all(columns <= K):
+    if len(rows) == len(along) == 1 and kernels.no_effects(kernels.row_of(rows[0])) and np.all(columns <= K):
         friction, damping, stiffness = rows[0, [T0, C, K]]
         force, slopes = element_force_sensitivities(x, steps, friction, damping, stiffness, initial_force, v)
         found = slopes[:, columns] @ along[0].T
@@ -136,7 +127,7 @@ def parallel_force_along(motion: Motion, parallel: Array) -> Array:
     motion : (n,) sampled motion
     parallel : (n, m) or (1, m) rows of these forces
     """
-    force = parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
+    force = kernels.parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
     return force + branch_forces(motion, parallel) if any_slips(parallel) else force
 
 
@@ -165,7 +156,7 @@ def any_slips(rows: Array) -> bool:
     """Return whether a branch acts in one of the (n, m) rows of the parallel forces."""
     found = False
     for i in range(rows.shape[0]):
-        found = found or branch_steady(1.0, rows[i]) != 0.0
+        found = found or kernels.branch_steady(1.0, rows[i]) != 0.0
     return found
 
 
@@ -180,10 +171,10 @@ def _fill_branches(x: Array, v: Array, time: Array, rows: Array, state: Array, f
         u0, u1 = travel / h - half, travel / h + half
         if u0 * u1 < 0.0:
             way = 0.5 * u0 * u0 / (u0 - u1) * h
-            branches_follow(way, state, now)
+            kernels.branches_follow(way, state, now)
             travel -= way
-        branches_follow(travel, state, now)
-        force[i] = branch_force(0.0, state, now)
+        kernels.branches_follow(travel, state, now)
+        force[i] = kernels.branch_force(0.0, state, now)
 
 
 def constant_value(channel: Array | None) -> Array | None:
@@ -269,13 +260,13 @@ def steady_force(
     rows = element_rows(damper, effective, temperature)
     rows = np.array(np.broadcast_to(rows, (v.size, rows.shape[1])))
     side = np.copysign(1.0, v)
-    force = np.array([s * flow_force(abs(w), row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
+    force = np.array([s * flow_force(abs(w), kernels.row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
     parallel = columns_of(damper, PARALLEL, effective)
     rest = np.zeros(v.size)
     moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
-    force += parallel_forces(rest, moving, rest, parallel) - static_force(damper, effective)
+    force += kernels.parallel_forces(rest, moving, rest, parallel) - static_force(damper, effective)
     branch_rows = np.broadcast_to(parallel, (v.size, parallel.shape[1]))
-    force += [branch_steady(s, row) for s, row in zip(side, branch_rows, strict=True)]
+    force += [kernels.branch_steady(s, row) for s, row in zip(side, branch_rows, strict=True)]
     return force.reshape(speeds.shape)
 
 
@@ -294,4 +285,4 @@ def static_force(damper: Damper, voltage: Array | float | None) -> Array:
     u = np.asarray(0.0 if voltage is None else voltage, dtype=np.float64)
     rest = np.zeros(u.size)
     rows = columns_of(damper, PARALLEL, None if voltage is None else u.ravel())
-    return parallel_forces(rest, rest, rest, rows).reshape(u.shape)
+    return kernels.parallel_forces(rest, rest, rest, rows).reshape(u.shape)

@@ -9,25 +9,8 @@ below the breakaway force nothing flows.
 from __future__ import annotations
 
 from pzd.compiled import compiled
-from pzd.damper.compiled.kernels import (
-    T0,
-    C,
-    Row,
-    bleed_factor,
-    direction_factor,
-    extra_force,
-    extra_none,
-    extra_slope,
-    extra_speed,
-    relief_of,
-    viscous_slope,
-    viscous_straight,
-    yield_force,
-    yield_sharp,
-    yield_slope,
-)
-from pzd.damper.compiled.kernels import viscous_force as viscous_force_at
-from pzd.damper.compiled.kernels import viscous_speed as viscous_speed_at
+from pzd.damper.compiled import kernels
+from pzd.damper.compiled.kernels import T0, C, Row
 
 _NEWTON_STEPS = 60  # bisection alone needs 53 for all digits of a double
 _NEWTON_TOLERANCE = 1e-13  # of the unknown: a few times its rounding
@@ -39,61 +22,61 @@ ends at T0 = 0 comes as near as 1e-12."""
 @compiled
 def damping(p: Row, side: float) -> float:
     """Return C [N s/m] in the direction `side` (+1 rebound, -1 compression)."""
-    return p[C] * direction_factor(side, p) * bleed_factor(side, p)
+    return p[C] * kernels.direction_factor(side, p) * kernels.bleed_factor(side, p)
 
 
 @compiled
 def breakaway(p: Row, side: float) -> float:
     """Compute the force [N] below which nothing flows in the direction `side` (+1 rebound, -1 compression)."""
-    force = yield_force(0.0, p[T0] * direction_factor(side, p), p)
+    force = kernels.yield_force(0.0, p[T0] * kernels.direction_factor(side, p), p)
     return force if force > _NO_FRICTION else 0.0
 
 
 @compiled
 def relief(p: Row, side: float) -> float:
     """Return the force [N] beyond which the relief valve is open."""
-    return relief_of(p[T0] * direction_factor(side, p), side, p)[0]
+    return kernels.relief_of(p[T0] * kernels.direction_factor(side, p), side, p)[0]
 
 
 @compiled
 def relief_slope(p: Row, side: float) -> float:
     """Return the slope of the curve [N s/m] beyond `relief`."""
-    return relief_of(p[T0] * direction_factor(side, p), side, p)[1]
+    return kernels.relief_of(p[T0] * kernels.direction_factor(side, p), side, p)[1]
 
 
 @compiled
 def straight(p: Row) -> bool:
     """Return whether the curve is T0 + C w, the relief valve shut."""
-    return extra_none(p) and viscous_straight(p) and yield_sharp(p)
+    return kernels.extra_none(p) and kernels.viscous_straight(p) and kernels.yield_sharp(p)
 
 
 @compiled
 def viscous_force(w: float, p: Row, side: float) -> float:
     """Compute the viscous force s [N] at a flow speed w >= 0 [m/s]."""
-    return viscous_force_at(w, damping(p, side), p)
+    return kernels.viscous_force(w, damping(p, side), p)
 
 
 @compiled
 def viscous_speed(s: float, p: Row, side: float) -> float:
     """Compute the flow speed w [m/s] at a viscous force s >= 0 [N]."""
-    return viscous_speed_at(s, damping(p, side), p)
+    return kernels.viscous_speed(s, damping(p, side), p)
 
 
 @compiled
 def smooth_force_of(s: float, p: Row, side: float) -> float:
     """Compute |F| [N] at a viscous force s >= 0 [N], the relief valve shut."""
     w = viscous_speed(s, p, side)
-    return yield_force(w, p[T0] * direction_factor(side, p), p) + s + extra_force(w, p)
+    return kernels.yield_force(w, p[T0] * kernels.direction_factor(side, p), p) + s + kernels.extra_force(w, p)
 
 
 @compiled
 def smooth_rise(w: float, p: Row, side: float) -> float:
     """Compute d|F|/ds >= 1 of `smooth_force_of` at a flow speed w [m/s]."""
-    factor = direction_factor(side, p)
-    bend = yield_slope(w, p[T0] * factor, p) + extra_slope(w, p)
+    factor = kernels.direction_factor(side, p)
+    bend = kernels.yield_slope(w, p[T0] * factor, p) + kernels.extra_slope(w, p)
     if bend == 0.0:
         return 1.0
-    return 1.0 + bend / viscous_slope(w, damping(p, side), p)
+    return 1.0 + bend / kernels.viscous_slope(w, damping(p, side), p)
 
 
 @compiled
@@ -105,30 +88,30 @@ def smooth_force(w: float, p: Row, side: float) -> float:
 @compiled
 def smooth_slope(w: float, p: Row, side: float) -> float:
     """Compute the slope [N s/m] of `smooth_force`; infinite at w = 0 where the fluid thins."""
-    return smooth_rise(w, p, side) * viscous_slope(w, damping(p, side), p)
+    return smooth_rise(w, p, side) * kernels.viscous_slope(w, damping(p, side), p)
 
 
 @compiled
 def speed_explicit(p: Row) -> bool:
     """Return whether `smooth_speed` is a closed form."""
-    if not yield_sharp(p):
+    if not kernels.yield_sharp(p):
         return False
-    return extra_none(p) or (viscous_straight(p) and extra_speed(1.0, p[C], p) >= 0.0)
+    return kernels.extra_none(p) or (kernels.viscous_straight(p) and kernels.extra_speed(1.0, p[C], p) >= 0.0)
 
 
 @compiled
 def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Compute the flow speed [m/s] at a force [N] >= breakaway, the relief valve shut; closed form where possible."""
-    if yield_sharp(p):
-        over = max(force - p[T0] * direction_factor(side, p), 0.0)
+    if kernels.yield_sharp(p):
+        over = max(force - p[T0] * kernels.direction_factor(side, p), 0.0)
         slope = damping(p, side)
-        if extra_none(p):
-            return viscous_speed_at(over, slope, p)
-        if viscous_straight(p):
-            speed = extra_speed(over, slope, p)
+        if kernels.extra_none(p):
+            return kernels.viscous_speed(over, slope, p)
+        if kernels.viscous_straight(p):
+            speed = kernels.extra_speed(over, slope, p)
             if speed >= 0.0:
                 return speed
-    if viscous_straight(p):
+    if kernels.viscous_straight(p):
         return _searched_speed(force, p, side, guess)
     return _searched_thinning(force, p, side, guess)
 
@@ -138,7 +121,7 @@ def _searched_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Solve `smooth_force` for the flow speed [m/s] by Newton's method within a bracket."""
     if force <= 0.0:
         return 0.0
-    low, high = 0.0, viscous_speed_at(force, damping(p, side), p)
+    low, high = 0.0, kernels.viscous_speed(force, damping(p, side), p)
     w = guess if low < guess < high else 0.5 * high
     for _ in range(_NEWTON_STEPS):
         miss = smooth_force(w, p, side) - force
@@ -164,13 +147,13 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
     """
     if force <= 0.0:
         return 0.0
-    low, high, friction = 0.0, force, p[T0] * direction_factor(side, p)
+    low, high, friction = 0.0, force, p[T0] * kernels.direction_factor(side, p)
     s = viscous_force(guess, p, side)
     if not low < s < high:
         s = 0.5 * high
     for _ in range(_NEWTON_STEPS):
         w = viscous_speed(s, p, side)
-        miss = yield_force(w, friction, p) + s + extra_force(w, p) - force
+        miss = kernels.yield_force(w, friction, p) + s + kernels.extra_force(w, p) - force
         if miss > 0.0:
             high = s
         else:

@@ -15,6 +15,8 @@ from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
+Effects = dict[str, dict[str, float | tuple[float, ...]]]
+"""Parameters of each effect, by its name and theirs."""
 
 PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (1e-4, 1e9), "k_N_per_m": (1.0, 1e13)}
 """Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge, wide enough for an
@@ -62,7 +64,7 @@ class Damper(Frozen):
 
     base: tuple[BaseRow, ...] = Field(min_length=1)
     """Bingham parameters, one row a voltage and temperature."""
-    effects: dict[str, dict[str, float | tuple[float, ...]]] = Field(default_factory=dict)
+    effects: Effects = Field(default_factory=dict)
     """Parameters of each effect, by the effect's name; see `pzd effects`."""
     reference_temperature_degC: float | None = None
     """T_ref of the effects of the material, as `temperature_drift`; needed only with one of them."""
@@ -72,9 +74,7 @@ class Damper(Frozen):
 
     @field_validator("effects")
     @classmethod
-    def _known_effects(
-        cls, effects: dict[str, dict[str, float | tuple[float, ...]]]
-    ) -> dict[str, dict[str, float | tuple[float, ...]]]:
+    def _known_effects(cls, effects: Effects) -> Effects:
         for name, values in effects.items():
             _check_effect(name, values)
         return effects

@@ -18,28 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled, inlined
+from pzd.damper import regimes
 from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, nudged, row_of, stroke_law, stroke_slope
 from pzd.damper.element import relaxation
 from pzd.damper.flow import breakaway, relief, relief_slope, smooth_force, smooth_slope, smooth_speed
-from pzd.damper.regimes import (
-    RELIEF,
-    SMOOTH,
-    STICK,
-    UNSOLVED,
-    TimeStep,
-    beyond,
-    deflection_at,
-    extension_speed,
-    is_straight,
-    onto_edge,
-    over_yield,
-    piece,
-    regime_of,
-    row_in,
-    speed_at,
-    spring_force,
-    whole_step,
-)
+from pzd.damper.regimes import RELIEF, SMOOTH, STICK, UNSOLVED, TimeStep, extension_speed, row_in, spring_force
 from pzd.record import Array
 
 DEFLECTION, SPEED = range(2)
@@ -143,7 +126,7 @@ def deflections(force: Array, rows: Array) -> Array:
 def _fill_deflections(force: Array, rows: Array, found: Array) -> None:
     """Fill the (n,) deflections of (n,) forces."""
     for i in range(force.size):
-        found[i] = deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
+        found[i] = regimes.deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
 
 
 @compiled
@@ -163,7 +146,7 @@ def _march(
     """Fill the (n,) force and, where there are variables, the (n, v) slopes."""
     p0 = row_of(rows[0])
     p1 = p0
-    state[DEFLECTION] = deflection_at(initial_force, p0)
+    state[DEFLECTION] = regimes.deflection_at(initial_force, p0)
     force[0] = spring_force(state[DEFLECTION], p0)
     begin_sensitivities(v, state[DEFLECTION], p0, initial_slopes)
     if v.deflection.size > 0:
@@ -177,7 +160,7 @@ def _march(
         mean = (displacement[i] - displacement[i - 1]) / h
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
         step = TimeStep(h, mean - half, mean + half, p0, p1, moving)
-        end, speed = whole_step(state[DEFLECTION], step, tolerance) if is_straight(p0, p1) else UNSOLVED
+        end, speed = regimes.whole_step(state[DEFLECTION], step, tolerance) if regimes.is_straight(p0, p1) else UNSOLVED
         if math.isnan(end):
             advance(state, step, tolerance, v, i - 1)
         else:
@@ -192,8 +175,8 @@ def _march(
 @compiled
 def _advance_whole_step(v: Sensitivities, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
     """Advance the derivatives over a step in one regime."""
-    regime, side = regime_of(spring_force(e, step.p0), step.p0)
-    w = speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
+    regime, side = regimes.regime_of(spring_force(e, step.p0), step.p0)
+    w = regimes.speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
     advance_sensitivities(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)
 
 
@@ -228,26 +211,26 @@ def advance(state: Array, step: TimeStep, tolerance: float, v: Sensitivities, sa
     dt = step.h
     force = abs(spring_force(e, step.p0))
     size = size_of(step)
-    regime, side = regime_of(spring_force(e, step.p0), step.p0)
+    regime, side = regimes.regime_of(spring_force(e, step.p0), step.p0)
     if regime != SMOOTH or abs(smooth_force(w, step.p0, side) - force) > _SAME_FORCE * force:
-        w = speed_at(force, step.p0, regime, side, w)
+        w = regimes.speed_at(force, step.p0, regime, side, w)
     for _ in range(_MOST_PIECES):
         dt = min(dt, step.h - at)
         if at < turn * (1.0 - _REST):
             dt = min(dt, turn - at)
-        end, speed, error = piece(e, w, at, dt, regime, side, step)
+        end, speed, error = regimes.piece(e, w, at, dt, regime, side, step)
         allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
         if not error <= allowed and dt > _LEAST_SHARE * step.h:  # not `error > allowed`: an overflow leaves NaN
             dt *= max(_SHORTENED, _growth(error, allowed)) if error > allowed else _SHORTENED
             continue
-        over, way = beyond(end, row_in(step, at + dt), regime, side)
+        over, way = regimes.beyond(end, row_in(step, at + dt), regime, side)
         following, onto = regime, side
         if over > 0.0:
             dt = _crossing(e, w, at, dt, over, way, regime, side, step)
-            end, speed, error = piece(e, w, at, dt, regime, side, step)
+            end, speed, error = regimes.piece(e, w, at, dt, regime, side, step)
             p = row_in(step, at + dt)
-            end, following, onto = onto_edge(end, p, regime, side, way)
-            speed = speed_at(abs(spring_force(end, p)), p, following, onto, speed)
+            end, following, onto = regimes.onto_edge(end, p, regime, side, way)
+            speed = regimes.speed_at(abs(spring_force(end, p)), p, following, onto, speed)
         if v.deflection.size > 0:
             advance_sensitivities(v, e, end, w, speed, at, dt, regime, side, step, sample)
         e, w = end, speed
@@ -279,11 +262,11 @@ def _distance_beyond(e: float, p: Row, regime: int, side: float, way: int) -> fl
     In SMOOTH, which has two edges, that in the direction `way` alone: a piece may start on the other one.
     """
     if regime == STICK:
-        return over_yield(e, p, side)
+        return regimes.over_yield(e, p, side)
     if regime == SMOOTH:
-        above_yield = over_yield(e, p, side)
+        above_yield = regimes.over_yield(e, p, side)
         return above_yield + breakaway(p, side) - relief(p, side) if way > 0 else -above_yield
-    return beyond(e, p, regime, side)[0]
+    return regimes.beyond(e, p, regime, side)[0]
 
 
 @compiled
@@ -293,12 +276,12 @@ def _crossing(
     """Find the length of the piece up to the edge of its regime by Newton's method in a bracket, then bisection."""
     size = abs(spring_force(e, step.p0)) + size_of(step)
     if regime == STICK:
-        end, _, _ = piece(e, w, at, dt, regime, side, step)
+        end, _, _ = regimes.piece(e, w, at, dt, regime, side, step)
         side = math.copysign(1.0, end)
     low, high, below, above = 0.0, dt, min(_distance_beyond(e, row_in(step, at), regime, side, way), 0.0), over
     if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: search for its return
         low = _OFF_EDGE * dt
-        end, _, _ = piece(e, w, at, low, regime, side, step)
+        end, _, _ = regimes.piece(e, w, at, low, regime, side, step)
         below = _distance_beyond(end, row_in(step, at + low), regime, side, way)
         if below >= 0.0:
             return _SHORTEST_PIECE * dt
@@ -306,7 +289,7 @@ def _crossing(
     for i in range(_BRACKET_STEPS):
         if i > _NEWTON_STEPS or not low < time < high:
             time = 0.5 * (low + high)
-        end, speed, _ = piece(e, w, at, time, regime, side, step)
+        end, speed, _ = regimes.piece(e, w, at, time, regime, side, step)
         p = row_in(step, at + time)
         residual = _distance_beyond(end, p, regime, side, way)
         if abs(residual) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:

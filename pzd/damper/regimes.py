@@ -10,32 +10,10 @@ import math
 from typing import NamedTuple
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.compiled.kernels import (
-    K,
-    Row,
-    effects_alike,
-    interpolate,
-    stroke_inverse,
-    stroke_law,
-    stroke_moves,
-    stroke_slope,
-    stroke_straight,
-)
+from pzd.damper import flow
+from pzd.damper.compiled import kernels
+from pzd.damper.compiled.kernels import K, Row
 from pzd.damper.element import Element, relaxation, slip
-from pzd.damper.flow import (
-    breakaway,
-    damping,
-    relief,
-    relief_slope,
-    smooth_force_of,
-    smooth_rise,
-    smooth_slope,
-    smooth_speed,
-    speed_explicit,
-    straight,
-    viscous_force,
-    viscous_speed,
-)
 
 # --- An exponential Rosenbrock method of order 5, with an error estimate of order 4 ---
 #
@@ -131,7 +109,7 @@ _GAUSS = (
 def spring_extension(e: float, p: Row) -> float:
     """Compute the extension s of the oil stiffness [m] at an elastic deflection [m]; 0 inside a free play."""
     side = 1.0 if e >= 0.0 else -1.0
-    extension = stroke_law(e, side, p)
+    extension = kernels.stroke_law(e, side, p)
     return extension if side * extension > 0.0 else 0.0
 
 
@@ -148,41 +126,42 @@ def spring_energy(e: float, p: Row, k: float) -> float:
     Equation: k integral s de; k s^2 / 2 where s rises like e
     """
     extension = spring_extension(e, p)
-    if extension == 0.0 or stroke_straight(p):
+    if extension == 0.0 or kernels.stroke_straight(p):
         return 0.5 * k * extension * extension
     side = 1.0 if e >= 0.0 else -1.0
-    start = stroke_inverse(0.0, side, p)
+    start = kernels.stroke_inverse(0.0, side, p)
     middle, half, area = 0.5 * (e + start), 0.5 * (e - start), 0.0
     for point, weight in _GAUSS:
-        area += weight * (stroke_law(middle + half * point, side, p) + stroke_law(middle - half * point, side, p))
+        low, high = middle - half * point, middle + half * point
+        area += weight * (kernels.stroke_law(high, side, p) + kernels.stroke_law(low, side, p))
     return k * half * area
 
 
 @compiled
 def deflection_at(force: float, p: Row) -> float:
     """Compute the elastic deflection [m] at which F = `force` [N], the nearest to zero."""
-    return 0.0 if force == 0.0 else stroke_inverse(force / p[K], math.copysign(1.0, force), p)
+    return 0.0 if force == 0.0 else kernels.stroke_inverse(force / p[K], math.copysign(1.0, force), p)
 
 
 @compiled
 def deflection_on(force: float, p: Row, side: float) -> float:
     """Compute the elastic deflection [m] at which |F| = `force` [N] on one side."""
-    return stroke_inverse(side * force / p[K], side, p)
+    return kernels.stroke_inverse(side * force / p[K], side, p)
 
 
 @compiled
 def regime_of(force: float, p: Row) -> tuple[int, float]:
     """Return the regime and the side (sign of F) of a force [N]."""
     side = 1.0 if force >= 0.0 else -1.0
-    if abs(force) <= breakaway(p, side):
+    if abs(force) <= flow.breakaway(p, side):
         return STICK, side
-    return (RELIEF if abs(force) > relief(p, side) else SMOOTH), side
+    return (RELIEF if abs(force) > flow.relief(p, side) else SMOOTH), side
 
 
 @compiled
 def over_yield(e: float, p: Row, side: float) -> float:
     """Compute |F| minus breakaway on one side [N]; inside a free play |F| counts as negative."""
-    return p[K] * (side * stroke_law(e, side, p)) - breakaway(p, side)
+    return p[K] * (side * kernels.stroke_law(e, side, p)) - flow.breakaway(p, side)
 
 
 @compiled
@@ -194,7 +173,7 @@ def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
     if regime == STICK:
         return over_yield(e, p, math.copysign(1.0, e)), 1
     below = -over_yield(e, p, side)
-    above = breakaway(p, side) - below - relief(p, side)
+    above = flow.breakaway(p, side) - below - flow.relief(p, side)
     if regime == RELIEF:
         return -above, -1
     return (below, -1) if below > above else (above, 1)
@@ -205,7 +184,7 @@ def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[flo
     """Return the deflection on the edge that is crossed, and the regime and side beyond it."""
     if regime == STICK:
         side = math.copysign(1.0, e)
-    low, high = breakaway(p, side), relief(p, side)
+    low, high = flow.breakaway(p, side), flow.relief(p, side)
     edge = high if (regime == RELIEF or (regime == SMOOTH and way > 0)) else low
     onto = deflection_on(edge, p, side)
     if way > 0:
@@ -213,7 +192,7 @@ def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[flo
     if regime == RELIEF and high > low:
         return onto, SMOOTH, side
     if low <= 0.0 and side * deflection_on(0.0, p, side) <= 0.0:  # no free play to stick in
-        return 0.0, (SMOOTH if relief(p, -side) > 0.0 else RELIEF), -side
+        return 0.0, (SMOOTH if flow.relief(p, -side) > 0.0 else RELIEF), -side
     return onto, STICK, side
 
 
@@ -223,9 +202,9 @@ def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> fl
     if regime == STICK:
         return 0.0
     if regime == RELIEF:
-        edge = relief(p, side)
-        return smooth_speed(edge, p, side, guess) + (force - edge) / relief_slope(p, side)
-    return smooth_speed(force, p, side, guess)
+        edge = flow.relief(p, side)
+        return flow.smooth_speed(edge, p, side, guess) + (force - edge) / flow.relief_slope(p, side)
+    return flow.smooth_speed(force, p, side, guess)
 
 
 # --- One piece of the path inside one regime ---
@@ -255,7 +234,7 @@ class TimeStep(NamedTuple):
 @inlined
 def row_in(step: TimeStep, at: float) -> Row:
     """Interpolate the parameter row at a moment [s] of the step."""
-    return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
+    return kernels.interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
 @inlined
@@ -272,27 +251,28 @@ def piece(
     if regime == STICK:
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
     p = row_in(step, at)
-    if not step.moving and stroke_straight(p) and (regime == RELIEF or straight(p)):
+    if not step.moving and kernels.stroke_straight(p) and (regime == RELIEF or flow.straight(p)):
         force = abs(spring_force(e, p))
-        slope = relief_slope(p, side) if regime == RELIEF else viscous_force(1.0, p, side)
+        slope = flow.relief_slope(p, side) if regime == RELIEF else flow.viscous_force(1.0, p, side)
         pull, pull_after = side * extension_speed(step, at), side * extension_speed(step, at + dt)
         end = slip(force, force - slope * w, pull, pull_after, relaxation(dt, slope, p[K]))
         return deflection_on(end, p, side), w + (end - force) / slope, 0.0
-    if speed_explicit(p):
+    if flow.speed_explicit(p):
         end, error = _exponential(e, w, at, dt, regime, side, step, True)
         p = row_in(step, at + dt)
-        force, other = side * p[K] * stroke_law(end, side, p), side * p[K] * stroke_law(end + error, side, p)
+        force = side * p[K] * kernels.stroke_law(end, side, p)
+        other = side * p[K] * kernels.stroke_law(end + error, side, p)
         return end, speed_at(force, p, regime, side, w), abs(other - force)
-    y = abs(spring_force(e, p)) if regime == RELIEF else viscous_force(w, p, side)
+    y = abs(spring_force(e, p)) if regime == RELIEF else flow.viscous_force(w, p, side)
     y, error = _exponential(y, w, at, dt, regime, side, step, False)
     p = row_in(step, at + dt)
     if regime == RELIEF:
         return deflection_on(y, p, side), speed_at(y, p, regime, side, w), abs(error)
     if y < 0.0:
-        return deflection_on(breakaway(p, side) + y, p, side), 0.0, abs(error)
-    w = viscous_speed(y, p, side)
-    error *= smooth_rise(w, p, side)
-    return deflection_on(smooth_force_of(y, p, side), p, side), w, abs(error)
+        return deflection_on(flow.breakaway(p, side) + y, p, side), 0.0, abs(error)
+    w = flow.viscous_speed(y, p, side)
+    error *= flow.smooth_rise(w, p, side)
+    return deflection_on(flow.smooth_force_of(y, p, side), p, side), w, abs(error)
 
 
 @compiled
@@ -326,8 +306,8 @@ def _slopes(
     """Compute the derivatives of the rate of the integrated variable by itself and by time."""
     p = row_in(step, at)
     if explicit:
-        rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
-        by_y = -p[K] * stroke_slope(y, side, p) / rise
+        rise = flow.relief_slope(p, side) if regime == RELIEF else flow.smooth_slope(w, p, side)
+        by_y = -p[K] * kernels.stroke_slope(y, side, p) / rise
     else:
         nudge = _NUDGE * max(y, p[K] * 1e-9)
         by_y = (_rate(y + nudge, w, at, regime, side, step, explicit) - rate) / nudge
@@ -349,7 +329,8 @@ def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Tim
     if not explicit:
         return _rate_of_force(y, at, regime, side, step)
     p = row_in(step, at)
-    return extension_speed(step, at) - side * speed_at(side * p[K] * stroke_law(y, side, p), p, regime, side, guess)
+    force = side * p[K] * kernels.stroke_law(y, side, p)
+    return extension_speed(step, at) - side * speed_at(force, p, regime, side, guess)
 
 
 @compiled
@@ -362,21 +343,21 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep
     p = row_in(step, at)
     pull = side * extension_speed(step, at)
     softening = (step.p1[K] - step.p0[K]) / (step.h * p[K]) if step.moving else 0.0
-    bent = not stroke_straight(p) or (step.moving and stroke_moves(step.p0, step.p1))
+    bent = not kernels.stroke_straight(p) or (step.moving and kernels.stroke_moves(step.p0, step.p1))
     if regime == RELIEF:
         rate = p[K] * (pull - speed_at(y, p, regime, side, 0.0))
         return (_behind_stroke(rate, y, at, p, side, step) if bent else rate) + softening * y
     s = max(y, 0.0)
-    w = viscous_speed(s, p, side)
+    w = flow.viscous_speed(s, p, side)
     rate = p[K] * (pull - w)
     if bent:
-        rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step)
+        rate = _behind_stroke(rate, flow.smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
         span = _DIFFERENCE * step.h
-        ahead = smooth_force_of(s, row_in(step, at + span), side)
-        behind = smooth_force_of(s, row_in(step, at - span), side)
-        rate += softening * smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
-    return rate / smooth_rise(w, p, side)
+        ahead = flow.smooth_force_of(s, row_in(step, at + span), side)
+        behind = flow.smooth_force_of(s, row_in(step, at - span), side)
+        rate += softening * flow.smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
+    return rate / flow.smooth_rise(w, p, side)
 
 
 @compiled
@@ -386,10 +367,11 @@ def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, st
     Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e
     """
     e = deflection_on(force, p, side)
-    rate *= stroke_slope(e, side, p)
+    rate *= kernels.stroke_slope(e, side, p)
     if step.moving:
         span = _DIFFERENCE * step.h
-        ahead, behind = stroke_law(e, side, row_in(step, at + span)), stroke_law(e, side, row_in(step, at - span))
+        ahead = kernels.stroke_law(e, side, row_in(step, at + span))
+        behind = kernels.stroke_law(e, side, row_in(step, at - span))
         rate += p[K] * side * (ahead - behind) / (2.0 * span)
     return rate
 
@@ -434,9 +416,9 @@ def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float
         return (end, 0.0) if regime_of(spring_force(end, q), q)[0] == STICK else UNSOLVED
     if regime == RELIEF:
         return UNSOLVED
-    first = Element(side * breakaway(p, side), damping(p, side), p[K])
+    first = Element(side * flow.breakaway(p, side), flow.damping(p, side), p[K])
     if step.moving:
-        last = Element(side * breakaway(q, side), damping(q, side), q[K])
+        last = Element(side * flow.breakaway(q, side), flow.damping(q, side), q[K])
         spring, error = _slipped(force / p[K], first, last, step)
         if error > tolerance * abs(force / p[K]):
             return UNSOLVED
@@ -452,7 +434,7 @@ def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float
 @compiled
 def is_straight(p: Row, q: Row) -> bool:
     """Return whether the flow curve has straight branches alone, and T0, C and k alone differ between two rows."""
-    return effects_alike(p, q) and stroke_straight(p) and straight(p)
+    return kernels.effects_alike(p, q) and kernels.stroke_straight(p) and flow.straight(p)
 
 
 @inlined

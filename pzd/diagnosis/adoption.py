@@ -23,20 +23,15 @@ from pzd.artefacts import Prediction
 from pzd.damper.compose import respond
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, fit, standard_errors
+from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, refit, standard_errors
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
-from pzd.diagnosis.thresholds import (
-    CROSS_VALIDATED_CANDIDATES,
-    INTERPOLATION_DEPARTURE,
-    LEAST_PREDICTION_GAIN,
-    SCREENED_EFFECTS,
-)
 from pzd.record import Array
 from pzd.signals.measures import rms
 
@@ -184,7 +179,7 @@ def _without_effect(selection: Selection, effect: str, reason: str = WORSENS_PRE
     evidence = evidence_of(selection.final_evidence.campaign, fewer)
     return replace(
         selection,
-        fitted=fit(evidence.whole, tuple(fewer.effects), evidence.whole.start_with(fewer)),
+        fitted=refit(evidence.whole, fewer),
         final_evidence=evidence,
         competing_confounders=tuple(c for c in selection.competing_confounders if c.effect != effect),
         reasons=reasons,
@@ -284,7 +279,7 @@ def _best_addition(
     """Return the candidate that predicts best among those that fit best; None where none improves the prediction."""
     tried = _possible_additions(current, config, adopted)
     better = []
-    for each in sorted(tried, key=lambda c: c.delta_bic)[:CROSS_VALIDATED_CANDIDATES]:
+    for each in sorted(tried, key=lambda c: c.delta_bic)[: thresholds.CROSS_VALIDATED_CANDIDATES]:
         error = validation.error_by_criterion(each.fitted.damper)
         if _improves(error, current.error, validation):
             better.append((each, error))
@@ -315,7 +310,7 @@ def _possible_additions(current: _CriterionFit, config: DiagnoseConfig, adopted:
             and not effect.needs_displacement_zero
             and testable(problem, effect)
         ]
-        for effect in most_promising(problem, fitted, new, SCREENED_EFFECTS):
+        for effect in most_promising(problem, fitted, new, thresholds.SCREENED_EFFECTS):
             own = problem.with_friction_scaling(effect)
             found.append(replace(candidate(own, fitted, effect), varies=own is not problem))
     return (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
@@ -325,7 +320,7 @@ def _improves(one: PredictionError, other: PredictionError, validation: CrossVal
     """Whether held-out tests are predicted better, visibly and beyond chance, and at no voltage worse."""
     if one.criterion is None or other.criterion is None:
         return False
-    less = one.criterion <= (1.0 - LEAST_PREDICTION_GAIN) * other.criterion
+    less = one.criterion <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * other.criterion
     return less and bool(validation.better_at(one, other)) and not validation.worse_at(one, other)
 
 
@@ -411,4 +406,4 @@ def _near_mean_force(damper: Damper, validation: CrossValidation, record: int, l
     below, half_way, above = force(low), force(0.5 * (low + high)), force(high)
     off = rms(half_way - 0.5 * (below + above))
     seen = validation.visible * float(max(np.max(np.abs(below)), np.max(np.abs(above))))
-    return off <= max(INTERPOLATION_DEPARTURE * rms(above - below), seen)
+    return off <= max(thresholds.INTERPOLATION_DEPARTURE * rms(above - below), seen)

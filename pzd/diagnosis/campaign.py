@@ -15,6 +15,7 @@ import numpy as np
 from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import rows_per_voltage
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
@@ -22,7 +23,6 @@ from pzd.diagnosis.fit.likelihood import WeightedRecord, weighted_record
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import Budget, Problem
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
-from pzd.diagnosis.thresholds import MOST_TIME_CONSTANTS
 from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.measures import criterion
 from pzd.signals.nuisance import NuisanceConfig
@@ -183,7 +183,7 @@ def _largest_rate(prepared: Sequence[PreparedRecord], damper: Damper) -> float:
     rate = max(p.record.rate for p in prepared)
     gentlest = min(float(np.max(np.abs(p.record.acceleration))) for p in prepared)
     turning = max(4.0 * row.T0_N * rate**2 / (row.C_Ns_per_m * gentlest) for row in damper.base)
-    return max(MOST_TIME_CONSTANTS * rate, turning)
+    return max(thresholds.MOST_TIME_CONSTANTS * rate, turning)
 
 
 def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecord], damper: Damper) -> Scales:

@@ -17,13 +17,13 @@ import numpy as np
 from pzd.artefacts import HeldOutTest, HeldOutVoltage, Prediction
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage, with_rows
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
-from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit
+from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.thresholds import INTERPOLATION_ERROR_RATIO, PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
@@ -48,6 +48,11 @@ class Folds:
     """Voltage of each group [V], 0 for a damper without a control signal; None where it moves."""
     folds: tuple[tuple[Mask, ...], ...]
     """Held-out samples of each fold, one mask (n,) per record."""
+
+    @property
+    def no_samples(self) -> tuple[Mask, ...]:
+        """Masks (n,), one per record, that hold out no sample."""
+        return tuple(np.zeros_like(mask) for mask in self.folds[0])
 
 
 def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
@@ -173,9 +178,8 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
     from scipy.special import ndtr, stdtrit
 
     tests = len(one.records)
-    return _error_is_larger(
-        one, other, float(stdtrit(tests - 1, ndtr(PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
-    )
+    errors = float(stdtrit(tests - 1, ndtr(thresholds.PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
+    return _error_is_larger(one, other, errors)
 
 
 def predicts_better(one: PredictionError, other: PredictionError) -> bool:
@@ -184,7 +188,7 @@ def predicts_better(one: PredictionError, other: PredictionError) -> bool:
     Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
     verdict, and nothing speaks against it.
     """
-    return _error_is_larger(other, one, PREDICTION_STANDARD_ERRORS)
+    return _error_is_larger(other, one, thresholds.PREDICTION_STANDARD_ERRORS)
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
@@ -213,7 +217,8 @@ def standard_error(differences: Array) -> float:
 
 def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts the tests of a left-out voltage visibly worse than another, and by half or more."""
-    return other.visibly_below(one) and (one.criterion or 0.0) > INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
+    much = thresholds.INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
+    return other.visibly_below(one) and (one.criterion or 0.0) > much
 
 
 # --- Cross-validation of a damper
@@ -238,11 +243,6 @@ class CrossValidation(Folds):
     """As identify found it from all tests."""
     visible: float
     """A gap (r.m.s.) below this share of a test's peak force does not count."""
-
-    @property
-    def no_samples(self) -> tuple[Mask, ...]:
-        """Masks (n,), one per record, that hold out no sample."""
-        return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.campaign.prepared)
 
     def baseline_error(self) -> PredictionError:
         """Compute the held-out prediction error of the baseline, refitted by criterion (4) as identify fits it."""
@@ -281,7 +281,7 @@ class CrossValidation(Folds):
         the least-squares problem and its solution; None where nothing is left to fit
         """
         problem = self._criterion_problem(damper)(held_out)
-        return None if problem is None else (problem, _fit(problem, damper))
+        return None if problem is None else (problem, refit(problem, damper))
 
     def worse_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
         """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it."""
@@ -454,16 +454,11 @@ def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_
     return replace(problem, observations=tuple(kept)) if kept else None
 
 
-def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
-    """Refit a damper from its present parameters."""
-    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
-
-
 def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
     """Refit a damper, without the base rows for which no test is left."""
     if problem is None:
         return None
-    found, rows = _fit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
+    found, rows = refit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
     return found if -1 in rows else with_rows(found, [found.base[i] for i in sorted(rows)])
 
 

@@ -112,11 +112,8 @@ def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
 def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     record = _denoised(raw, constant=constant)
     run = cycles(record.time, record.displacement)
-    if run is None:
-        return PreparedRecord(_smoothed_displacement(record), None, None, constant)
-    inside = run.inside(record.time)
     travel = np.abs(np.gradient(record.displacement))
-    if travel[inside].sum() < REPEATING_SHARE * travel.sum():
+    if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
         return PreparedRecord(_smoothed_displacement(record), None, None, constant)
     average = AverageCycle.of(record, run)
     motion = average.motion(average.clear_harmonics)
@@ -190,9 +187,8 @@ class AverageCycle:
     def of(cls, record: Record, run: Cycles) -> AverageCycle:
         """Average the cycles of a record, and estimate how well the average is known."""
         folded = run.fold(record.time, record.displacement)
-        creep = drift_over_cycles(
-            folded
-        )  # else a mean that walks would end every cycle with a step, which the oil spring feels
+        # A mean that walks would end every cycle with a step, which loads the oil spring.
+        creep = drift_over_cycles(folded)
         error = pure_error(folded - creep + creep.mean())
         finest = float(np.median(np.diff(np.unique(record.displacement))))
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
@@ -232,8 +228,7 @@ class AverageCycle:
         low, high = neighbouring_harmonics(above.size - 1)
         sums, counts = (np.concatenate([[0.0], np.cumsum(each)]) for each in (above, ~self.clear))
         mean = (sums[high + 1] - sums[low]) / np.maximum(counts[high + 1] - counts[low], 1.0)
-        power: Array = np.where(self.clear, 0.0, np.maximum(mean, 0.0))
-        return power
+        return np.asarray(np.where(self.clear, 0.0, np.maximum(mean, 0.0)))
 
     def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
         """Draw (H + 1,) an error of `clear_harmonics`: noise in what is kept, and what is left out."""
@@ -245,13 +240,11 @@ class AverageCycle:
 
     def _cycle(self, harmonics: NDArray[np.complex128]) -> Array:
         """Return the (points,) cycle of some harmonics (H + 1,)."""
-        cycle: Array = np.fft.irfft(harmonics, self.points) * self.points
-        return cycle
+        return np.asarray(np.fft.irfft(harmonics, self.points) * self.points)
 
     def _spectrum(self, cycle: Array) -> NDArray[np.complex128]:
         """Return the (H + 1,) harmonics of a cycle (points,)."""
-        spectrum: NDArray[np.complex128] = np.fft.rfft(cycle)[: self.harmonics.size] / self.points
-        return spectrum
+        return np.asarray(np.fft.rfft(cycle)[: self.harmonics.size] / self.points)
 
     def motion(self, harmonics: NDArray[np.complex128], finer: int = POINTS_OF_CYCLE) -> Callable[[Array], Motion]:
         """Return displacement, velocity and acceleration of some harmonics (H + 1,) as a function of time."""

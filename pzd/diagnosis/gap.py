@@ -11,20 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Gap, Region
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.data import PreparedRecord, Split
 from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
-from pzd.diagnosis.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask
+from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
-from pzd.signals.lack_of_fit import (
-    TREND_CYCLES,
-    TREND_HARMONICS,
-    fit_smooth_residual,
-    p_value_of_trend,
-    p_values_by_harmonics,
-    pooled_p_value,
-)
 from pzd.signals.measures import reversals
 from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
@@ -79,7 +72,9 @@ def check_residual(
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
     mask = wanted & comparable_samples(prepared)
-    mains = _mains(prepared, residual, mask)
+    run, peak = prepared.cycles, float(np.max(np.abs(record.force)))
+    # The mains nearly repeat from cycle to cycle, as a gap does.
+    mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
     variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
@@ -95,13 +90,6 @@ def check_residual(
     else:
         found = _check_samples(prepared, mask, residual, explained, predicted)
     return replace(found, hum=float(np.max(np.abs(mains))))
-
-
-def _mains(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array:
-    """Estimate the (n,) mains hum in the force [N]; it nearly repeats from cycle to cycle, as a gap does."""
-    record, run = prepared.record, prepared.cycles
-    peak = float(np.max(np.abs(record.force)))
-    return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
@@ -134,12 +122,12 @@ def _check_cycles(
     by_displacement: Array | float,
 ) -> ResidualCheck:
     error = replace(pure_error(folded), shared=by_displacement)
-    trend = p_value_of_trend(folded)
-    probability = {"harmonics": p_values_by_harmonics(error)}
+    trend = lack_of_fit.p_value_of_trend(folded)
+    probability = {"harmonics": lack_of_fit.p_values_by_harmonics(error)}
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
-    if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
+    if trend is not None and trend < thresholds.CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
         prepared, mask, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
@@ -149,7 +137,7 @@ def _check_cycles(
 def _check_samples(
     prepared: PreparedRecord, mask: Mask, residual: Array, nuisances: Array, predicted: Array
 ) -> ResidualCheck:
-    fit = fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
+    fit = lack_of_fit.fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
     left = (residual - nuisances)[mask] - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)
@@ -172,17 +160,16 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
 def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
     """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
     folded = _folded(prepared, residual, mask)
-    if folded is not None:
-        return float(np.mean(np.diff(folded, axis=0) ** 2) / 2.0)
-    return float(np.mean(np.diff(residual[mask]) ** 2) / 2.0)
+    steps = np.diff(residual[mask]) if folded is None else np.diff(folded, axis=0)
+    return float(np.mean(steps**2) / 2.0)
 
 
 def _trend_power(folded: Array, error: PureError) -> float:
     """Compute the mean square of a steady change from cycle to cycle, less its share of noise [N^2]."""
     count, points = folded.shape
-    if count < TREND_CYCLES:
+    if count < lack_of_fit.TREND_CYCLES:
         return 0.0
-    last = min(TREND_HARMONICS, harmonics_of(points))
+    last = min(lack_of_fit.TREND_HARMONICS, harmonics_of(points))
     order = np.arange(count) - (count - 1) / 2.0
     coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
     slopes = np.abs(order @ coefficients / (order @ order)) ** 2 - error.single[: last + 1] / (order @ order)
@@ -248,9 +235,8 @@ def _by_block(check: ResidualCheck, values: Array) -> Array:
 def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
     """Compute the probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for c in checks for kind in c.probability}
-    return min(
-        1.0, *(len(kinds) * pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds)
-    )
+    pooled = [lack_of_fit.pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds]
+    return min(1.0, *(len(kinds) * p for p in pooled))
 
 
 def visible_gap(checks: Sequence[ResidualCheck]) -> float:
@@ -321,20 +307,16 @@ def _points(check: ResidualCheck) -> dict[str, Array]:
     The density is the squared residual less its share of noise; it sums to the gap.
     """
     record, run = check.prepared.record, check.prepared.cycles
+    names = ("velocity", "displacement", "acceleration")
     if check.folded is None or run is None:
         keep = check.wanted
-        names = ("velocity", "displacement", "acceleration")
         motion = {name: getattr(record, name)[keep] for name in names}
         density = (check.cleared**2 - check.variance if check.explained is None else check.explained)[keep]
         voltage = record.voltage[keep] if record.voltage is not None else np.full(density.size, np.nan)
         return {**motion, "density": density, "weight": np.ones(density.size), "voltage": voltage}
     count = check.folded.shape[0]
     mean = check.folded.mean(axis=0)
-    motion = {
-        "velocity": run.mean(record.time, record.velocity),
-        "displacement": run.mean(record.time, record.displacement),
-        "acceleration": run.mean(record.time, record.acceleration),
-    }
+    motion = {name: run.mean(record.time, getattr(record, name)) for name in names}
     voltage = np.full(mean.size, record.median_voltage() if record.voltage is not None else np.nan)
     density = count * (mean**2 - check.variance / count)
     return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}

@@ -145,14 +145,9 @@ class HeldOutTests:
         return [self.prepared[i].record.name for voltage, group in found if voltage is None for i in group]
 
     @property
-    def no_samples(self) -> tuple[Mask, ...]:
-        """Masks (n,), one per record, of no sample."""
-        return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.prepared)
-
-    @property
     def all_samples(self) -> tuple[Mask, ...]:
         """Masks (n,), one per record, of every sample."""
-        return tuple(~mask for mask in self.no_samples)
+        return tuple(~mask for mask in self.folds.no_samples)
 
     def fitted(self, peer: Peer, form: PeerForm, group: int, held_out: Sequence[Mask]) -> PeerFit:
         """Fit a form of a peer at one voltage to all but the held-out samples; the result is cached."""
@@ -186,7 +181,7 @@ class HeldOutTests:
 
     def interpolation_error(self, peer: Peer, group: int) -> PredictionError:
         """Compute the prediction error at a voltage, with parameters interpolated between the other voltages."""
-        form, fits = self.best_form(peer, self.no_samples, (g for g in range(len(self.groups)) if g != group))
+        form, fits = self.best_form(peer, self.folds.no_samples, (g for g in range(len(self.groups)) if g != group))
         return self._predicted_error(peer, form, fits, group, self.all_samples)
 
     def known_error(self, figures: Mapping[int, float]) -> PredictionError:
@@ -315,7 +310,7 @@ def _comparison(
             status=fit.status,
         )
         for peer in peers().values()
-        for form, fits in [tests.best_form(peer, tests.no_samples, range(len(tests.groups)))]
+        for form, fits in [tests.best_form(peer, tests.folds.no_samples, range(len(tests.groups)))]
         for voltage, fit in fits.items()
         for parameter, value in zip(peer.parameters, fit.parameters, strict=True)
     ]

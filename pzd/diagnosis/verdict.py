@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
 from pzd.damper.confounders import known
 from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects
 from pzd.diagnosis.campaign import Campaign, nearest_row
 from pzd.diagnosis.config import DiagnoseConfig
@@ -26,17 +27,6 @@ from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
-from pzd.diagnosis.thresholds import (
-    DOUBTFUL_BELOW,
-    FEWEST_FOR_A_TREND,
-    LARGE_REMAINDER,
-    LARGEST_GAP,
-    LIKELIER_THAN_NOT,
-    NOT_EXCLUDED,
-    NUISANCE_EFFECTS,
-    OUTSIDE_LIBRARY,
-    SMALLEST_GAP,
-)
 from pzd.record import Array
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
@@ -111,16 +101,14 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
         return Decision("unexplained", words, None)
     odd = against_nature(selection.fitted.damper)
     if odd and not selection.rivals:
-        words = (
-            f"{change}; but with a value that no {' and no '.join(odd)} has, so that it is something that looks alike"
-        )
-        return Decision("unexplained", words, None)
+        value = f"a value that no {' and no '.join(odd)} has"
+        return Decision("unexplained", f"{change}; but with {value}, so that it is something that looks alike", None)
     better = [m for m in selection.competing_confounders if m.bic_difference < -config.rival_bic]
     if better:
-        others = [
+        laws = [
             f"{known()[m.confounder].law}, which is not in the library, does better than {m.effect}" for m in better
         ]
-        return Decision("unexplained", f"{change}; but {' and '.join(others)}", None)
+        return Decision("unexplained", f"{change}; but {' and '.join(laws)}", None)
     return _explained(change, selection, config)
 
 
@@ -135,7 +123,7 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
         words = f"{change}{_not_excluded_note(selection, config)} beside it"
         sure = verdict_confidence(selection, config, possible)
         return Decision("ambiguous", words, sure, possible, doubtful=True)
-    doubt = _not_excluded_note(selection, config) if sure < DOUBTFUL_BELOW else ""
+    doubt = _not_excluded_note(selection, config) if sure < thresholds.DOUBTFUL_BELOW else ""
     words = f"{change}; what is left is within the noise or negligible{doubt}"
     return Decision("named", words, sure, doubtful=bool(doubt))
 
@@ -154,7 +142,7 @@ def _gap_change(selection: Selection, sizes: tuple[float, float], config: Diagno
 def _gap_remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
     """Whether too much of the gap is left (r.m.s. above the noise): as a share of it, or beyond what is visible."""
     share = sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
-    return share or sizes[1] >= LARGE_REMAINDER * config.visible
+    return share or sizes[1] >= thresholds.LARGE_REMAINDER * config.visible
 
 
 def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:
@@ -174,7 +162,7 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
         words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise"
     else:
         words = f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing"
-    doubtful = sure < DOUBTFUL_BELOW
+    doubtful = sure < thresholds.DOUBTFUL_BELOW
     words += _not_excluded_note(selection, config) if doubtful else ""
     return Decision("none", words, sure, doubtful=doubtful)
 
@@ -205,7 +193,7 @@ def verdict_confidence(selection: Selection, config: DiagnoseConfig, beside: Col
     beside : effects that are reported as possible beside the adopted ones
     """
     named = {*selection.adopted, *selection.rivals}
-    sure = 1.0 - OUTSIDE_LIBRARY
+    sure = 1.0 - thresholds.OUTSIDE_LIBRARY
     for step in selection.steps:
         if step.chosen in selection.adopted:
             low_force = selection.final_evidence.whole.scales.low_force
@@ -226,7 +214,7 @@ def not_excluded(selection: Selection, config: DiagnoseConfig) -> dict[str, Dete
     config : which gaps count
     """
     chances = _remaining_probabilities(selection, config)
-    likely = [name for name, chance in chances.items() if name is not None and chance >= NOT_EXCLUDED]
+    likely = [name for name, chance in chances.items() if name is not None and chance >= thresholds.NOT_EXCLUDED]
     likely.sort(key=chances.__getitem__, reverse=True)
     return {name: max(selection.open_detections[name], key=lambda each: each.size) for name in likely}
 
@@ -236,9 +224,9 @@ def _likelier_alternatives(selection: Selection, config: DiagnoseConfig) -> tupl
 
     An offset, a delay or a lag may be each test's own: whether these are open depends on their size, see `trivial`.
     """
-    if verdict_confidence(selection, config, NUISANCE_EFFECTS) >= LIKELIER_THAN_NOT:
+    if verdict_confidence(selection, config, thresholds.NUISANCE_EFFECTS) >= thresholds.LIKELIER_THAN_NOT:
         return ()
-    return tuple(name for name in not_excluded(selection, config) if name not in NUISANCE_EFFECTS)
+    return tuple(name for name in not_excluded(selection, config) if name not in thresholds.NUISANCE_EFFECTS)
 
 
 def _not_excluded_note(selection: Selection, config: DiagnoseConfig) -> str:
@@ -257,6 +245,7 @@ def _probabilities(tried: Mapping[str, Sequence[Detection]], visible: float) -> 
     """Compute the posterior probability of each effect, and under None that of no effect."""
     from scipy.special import logsumexp, softmax
 
+    smallest, largest = thresholds.SMALLEST_GAP * visible, thresholds.LARGEST_GAP
     tested = {name: found for name, found in tried.items() if found}
     if not tested:
         return {None: 1.0}
@@ -265,16 +254,14 @@ def _probabilities(tried: Mapping[str, Sequence[Detection]], visible: float) -> 
         """Average the odds over the starting values of an effect, over the gaps that count or over smaller ones."""
         odds = []
         for each in found:
-            least = min(max(visible, each.relevant_from), LARGEST_GAP / 2.0)
-            odds.append(each.log_odds(least, LARGEST_GAP) if counts else each.log_odds(SMALLEST_GAP * visible, least))
+            least = min(max(visible, each.relevant_from), largest / 2.0)
+            odds.append(each.log_odds(least, largest) if counts else each.log_odds(smallest, least))
         return float(logsumexp(odds) - np.log(len(found)))
 
     small = [log_odds(found, counts=False) for found in tested.values()]
     nothing = float(np.logaddexp(0.0, logsumexp(small) - np.log(len(tested)))) - np.log(2.0) + np.log(len(tested))
-    odds: dict[str | None, float] = {
-        None: nothing,
-        **{name: log_odds(found, counts=True) for name, found in tested.items()},
-    }
+    odds: dict[str | None, float] = {None: nothing}
+    odds.update((name, log_odds(found, counts=True)) for name, found in tested.items())
     return dict(zip(odds, map(float, softmax([*odds.values()])), strict=True))
 
 
@@ -345,9 +332,8 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
         for name, follows, trend, size in pairs
         if trend is not None
     ]
-    significant = [
-        t for t in found if t.probability < config.significance and t.size >= LARGE_REMAINDER * config.visible
-    ]
+    visible = thresholds.LARGE_REMAINDER * config.visible
+    significant = [t for t in found if t.probability < config.significance and t.size >= visible]
     return min(significant, key=lambda t: t.probability, default=None)
 
 
@@ -380,7 +366,7 @@ def _within_condition_trend(values: Array, over: Array, condition: NDArray[np.in
     known = np.isfinite(over)
     y, x, condition = values[known], over[known], condition[known]
     free = y.size - np.unique(condition).size - 1
-    if free < FEWEST_FOR_A_TREND:
+    if free < thresholds.FEWEST_FOR_A_TREND:
         return None
     for each in np.unique(condition):
         inside = condition == each
@@ -453,21 +439,15 @@ def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseCo
 
 def _knee_parameters(row: KneeRow) -> ParameterRow:
     """Return T0, C (mean bleed of both directions) and k of one condition."""
+    shared = ("setting", "voltage_V", "temperature_degC", "k_N_per_m", "k_N_per_m_low95", "k_N_per_m_high95")
     return ParameterRow(
-        setting=row.setting,
-        voltage_V=row.voltage_V,
-        temperature_degC=row.temperature_degC,
+        **row.model_dump(include={*shared, "W_s", "rmse_N"}),
         T0_N=row.friction_N,
         T0_N_low95=row.friction_N_low95,
         T0_N_high95=row.friction_N_high95,
         C_Ns_per_m=0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m),
         C_Ns_per_m_low95=None,
         C_Ns_per_m_high95=None,
-        k_N_per_m=row.k_N_per_m,
-        k_N_per_m_low95=row.k_N_per_m_low95,
-        k_N_per_m_high95=row.k_N_per_m_high95,
-        W_s=row.W_s,
-        rmse_N=row.rmse_N,
         status="ok" if row.status == "ok" else "weak: T0, C, k (2-identify/knee.csv says why)",
     )
 

@@ -23,30 +23,17 @@ from pzd.artefacts import (
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.diagnosis import data, next_test
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.campaign import Campaign, Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
-from pzd.diagnosis.data import (
-    TRAINING,
-    PreparedRecord,
-    centred_on,
-    prepare,
-    saturation_note,
-    split,
-    unsaturated_records,
-)
-from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, standard_errors
+from pzd.diagnosis.data import TRAINING, PreparedRecord
+from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions
 from pzd.diagnosis.hypotheses import hypotheses
-from pzd.diagnosis.next_test import (
-    OperatingEnvelope,
-    intermediate_voltage_test,
-    operating_envelope,
-    repeated_longest_test,
-    separating_test,
-)
+from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.verdict import (
@@ -84,16 +71,16 @@ def diagnose_setting(
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
     if identified.knees.law_of(setting) == "knee":
         return knee_verdict(identified, setting, diagnose)
-    records, saturated = unsaturated_records(rig, setting)
-    recorded = prepare(records)
+    records, saturated = data.unsaturated_records(rig, setting)
+    recorded = data.prepare(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
-    prepared = centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
-    roles = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
+    prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
+    roles = data.split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     baseline = base_of(identified.rows, setting)
     campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
-    envelope = operating_envelope(stand.limits, recorded, voltages)
+    envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
     validation = cross_validation_of(campaign, baseline, diagnose.visible)
@@ -102,11 +89,11 @@ def diagnose_setting(
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
-    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), saturation_note(saturated), _hum(before)
+    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), data.saturation_note(saturated)
     final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason="".join((decision.reason, campaign.budget.note, *limits)),
+        reason="".join((decision.reason, campaign.budget.note, *limits, _hum(before))),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),
@@ -148,12 +135,12 @@ def _next_test(
     if selection.rival_dampers:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rival_dampers]
         offsets = [campaign.offset(damper) for _, damper in selection.rival_dampers]
-        return separating_test(rivals, envelope, temperature, offsets)
+        return next_test.separating_test(rivals, envelope, temperature, offsets)
     if decision.doubtful:
-        return repeated_longest_test(recorded, envelope)
+        return next_test.repeated_longest_test(recorded, envelope)
     offset = campaign.offset(final.moved(-zero) if selection.adopted else final)
     errors = adoption.error, adoption.interpolation_error
-    return intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
+    return next_test.intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
 
 
 # --- Entries of the files: ranking, parameters with intervals, and the held-out gap
@@ -248,18 +235,16 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
     fitted, whole = selection.fitted, selection.final_evidence.whole
     compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
     rows = []
-    for place, (row, widths) in enumerate(
-        zip(fitted.damper.base, base_half_widths(fitted, whole.scales.force), strict=True)
-    ):
+    half_widths = base_half_widths(fitted, whole.scales.force)
+    for place, (row, widths) in enumerate(zip(fitted.damper.base, half_widths, strict=True)):
         mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
         measured = np.concatenate([m for m, _ in mine])
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
+        scales = parameter_scales(parameters, measured).tolist()
         evidence = [
             ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
-            for name, scale, width in zip(
-                PARAMETER_NAMES, parameter_scales(parameters, measured).tolist(), widths.tolist(), strict=True
-            )
+            for name, scale, width in zip(PARAMETER_NAMES, scales, widths.tolist(), strict=True)
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)
         rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals)))
@@ -284,6 +269,6 @@ def held_out_gap(selection: Selection, validation: CrossValidation | None = None
     not_training = [~mask for mask in campaign.in_role(TRAINING)]
     found = None if validation is None else validation.fit_by_criterion(selection.fitted.damper, not_training)
     training = selection.final_evidence.halves[0]
-    adopted = found[1] if found else fit(training, selection.adopted, training.start_with(selection.fitted.damper))
+    adopted = found[1] if found else refit(training, selection.fitted.damper)
     after = held_out_criterion(campaign.held_out_checks(adopted.damper), campaign.split)
     return after.model_copy(update={"before": before.before})

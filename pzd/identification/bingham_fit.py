@@ -288,7 +288,7 @@ class KnownOptimum(Exception):  # noqa: N818  # nothing went wrong
     """A descent has reached an optimum that is known."""
 
 
-def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingham]:
+def grid_starts(objective: Objective) -> list[Bingham]:
     """Return the best points of the grid, best first.
 
     Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
@@ -305,7 +305,7 @@ def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingha
             if match > 0.0:
                 k = match / energy
                 found.append((-match * k, Bingham(float(delta) * k, float(tau) * k, k)))
-    return [objective.clipped(start) for _, start in sorted(found)[:count]]
+    return [objective.clipped(start) for _, start in sorted(found)[:GRID_DESCENTS]]
 
 
 def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit:

@@ -15,20 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.artefacts import AuxiliaryRow, ParameterRow
+from pzd.identification import trust
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_evolutionary, fit_separable
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
 from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare
-from pzd.identification.trust import (
-    MISFIT_THRESHOLD,
-    ParameterEvidence,
-    misfit_of,
-    parameter_evidence,
-    parameter_scales,
-    partial_sensitivities,
-    stationarity,
-    trust_of,
-)
+from pzd.identification.trust import ParameterEvidence
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
 from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
@@ -112,19 +104,19 @@ def parameter_rows(
     touched : (N, rows) samples on which each row is judged; None for all
     """
     residuals, slopes = fitted
-    misfit = misfit_of(records)
+    misfit = trust.misfit_of(records)
     noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
     widths = half_widths(records, misfit).reshape(-1, 3)
-    scales = np.stack([parameter_scales(parameters, objective.measured) for _, parameters in optimum])
-    shares = partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
-    cosines = stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
+    scales = np.stack([trust.parameter_scales(parameters, objective.measured) for _, parameters in optimum])
+    shares = trust.partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
+    cosines = trust.stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
     rows = []
     for i, (labels, parameters) in enumerate(optimum):
         here = touched[:, i] if touched is not None and np.any(touched[:, i]) else slice(None)
         measured, left = objective.measured[here], residuals[here]
         share = shares[i] * np.sqrt(objective.energy / float(measured @ measured))
         facts = np.stack([scales[i], noise[i], widths[i], share, cosines[i]])
-        evidence = parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit)
+        evidence = trust.parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit)
         rows.append(parameter_row(labels, parameters, widths[i], evidence, (measured, left)))
     return rows
 
@@ -146,13 +138,13 @@ def parameter_row(
     evidence : on T0, C and k
     fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
     """
-    trust = trust_of(evidence)
+    status, determined = trust.trust_of(evidence)
     measured, residuals = fitted
     cells = label_columns(labels)
     names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "log", "log"), strict=True)
-    for (name, scale), value, width, known in zip(names, parameters, widths, trust.determined, strict=True):
+    for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
-    cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": trust.status}
+    cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}
     return ParameterRow.model_validate(cells)
 
 
@@ -196,7 +188,7 @@ def auxiliary_is_visible(objective: Objective, fit: Fit) -> bool:
     base, _ = np.linalg.qr(slopes)
     beyond, _ = np.linalg.qr(columns - base @ (base.T @ columns))
     explained = float(np.sum((beyond.T @ fit.residuals) ** 2)) / fit.residuals.size
-    return bool(np.sqrt(explained) > MISFIT_THRESHOLD * objective.scales[0])
+    return bool(np.sqrt(explained) > trust.MISFIT_THRESHOLD * objective.scales[0])
 
 
 def auxiliary_start(objective: Objective) -> Array:
@@ -209,8 +201,7 @@ def auxiliary_start(objective: Objective) -> Array:
     terms = np.column_stack([columns, np.sign(speed), speed])
     size = np.linalg.norm(terms, axis=0)
     size[size == 0.0] = 1.0
-    found: Array = (np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2]
-    return found
+    return np.asarray((np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2])
 
 
 def without_auxiliary_force(objective: Objective, values: Array) -> Objective:
@@ -247,7 +238,7 @@ def significant_auxiliary(
     columns, middle = auxiliary_columns(objective)
     slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1], columns])
     fitted = fitted_records(records, objective.prepared, (fit.residuals, slopes), nuisance)
-    misfit = misfit_of(fitted)
+    misfit = trust.misfit_of(fitted)
     if not np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]):
         return None
     return Auxiliary(values, half_widths(fitted, misfit)[3:], middle)

@@ -207,8 +207,7 @@ def _covariance_of_pulls(given: Sequence[Array], grams: Sequence[Array], bread: 
     own = np.stack([g.T @ row for g in given])
     shared = np.stack([bread @ (g @ row) for g in grams])
     cross = np.stack([g @ o for g, o in zip(given, own, strict=True)]) @ shared.T
-    found: Array = np.diag(np.sum(own**2, axis=1)) - cross - cross.T + shared @ whole @ shared.T
-    return found
+    return np.asarray(np.diag(np.sum(own**2, axis=1)) - cross - cross.T + shared @ whole @ shared.T)
 
 
 # --- Hidden law ---

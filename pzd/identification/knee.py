@@ -149,9 +149,7 @@ def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
         rebound, compression = steady_force(damper, voltage, row.temperature_degC, np.array([speed, -speed])) + rest
         inside = speed <= SPEED_ROUNDING * row.reached_m_per_s
         yield KneeForceRow(
-            setting=row.setting,
-            voltage_V=row.voltage_V,
-            temperature_degC=row.temperature_degC,
+            **label_columns((row.setting, row.voltage_V, row.temperature_degC)),
             velocity_m_per_s=speed,
             rebound_force_N=float(rebound),
             compression_force_N=float(compression),
@@ -258,18 +256,11 @@ def held_out_predictions(
             left = [one.measured - fit.predicted(one) for fit in fits]
             unseen = np.full(one.measured.size, MISFIT_THRESHOLD * one.peak)
             squares = np.array([float(r @ r) for r in (*left, one.measured, unseen)])
-            found[i] = _predicted(labels, one, left), squares
+            W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
+            name = one.tests[0].record.name
+            row = PredictedRow(record=name, **label_columns(labels), W_s_bingham=W_s_bingham, W_s_knee=W_s_knee)
+            found[i] = row, squares
     return [found[i] for i in range(count)]
-
-
-def _predicted(labels: Labels, one: KneeData, left: Sequence[Array]) -> PredictedRow:
-    """Return the row of one test from the prediction errors (2, N) of both laws."""
-    return PredictedRow(
-        record=one.tests[0].record.name,
-        **label_columns(labels),
-        W_s_bingham=criterion(left[0], one.measured),
-        W_s_knee=criterion(left[1], one.measured),
-    )
 
 
 def law_row(

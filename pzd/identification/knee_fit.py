@@ -122,8 +122,6 @@ FORCE_TOLERANCE = 1e-6
 class KneeRecord:
     """One test, its displacement counted from mid-stroke of all tests of the fit."""
 
-    __test__ = False
-
     record: Record
     motion: Motion
     steps: Array
@@ -141,8 +139,6 @@ class KneeRecord:
 @dataclass(frozen=True, eq=False)
 class KneeData:
     """Tests of one condition, or a subset of them."""
-
-    __test__ = False
 
     tests: tuple[KneeRecord, ...]
     middle: float

@@ -19,15 +19,8 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion, parts_of_steps
-from pzd.identification.bingham_fit import (
-    TOLERANCE,
-    Bingham,
-    Objective,
-    fit_separable,
-    from_search,
-    search_slopes,
-    to_search,
-)
+from pzd.identification import bingham_fit
+from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
 from pzd.identification.condition import parameter_rows
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.prepared_record import fitted_records, prepare
@@ -157,7 +150,7 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     low, high = (np.tile(b, len(starts)) for b in objective.constant.search_bounds)
 
     def parameters(x: Array) -> list[Bingham]:
-        return [from_search(part, stroke) for part in x.reshape(-1, 3)]
+        return [bingham_fit.from_search(part, stroke) for part in x.reshape(-1, 3)]
 
     def residuals_at(x: Array) -> Array:
         return np.asarray(objective.residuals(parameters(x)) / norm)
@@ -165,19 +158,19 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     def slopes_at(x: Array) -> Array:
         free = parameters(x)
         slopes = objective.slopes(free, objective.residuals(free))
-        inner = [slopes[:, 3 * i : 3 * i + 3] @ search_slopes(p, stroke) for i, p in enumerate(free)]
+        inner = [slopes[:, 3 * i : 3 * i + 3] @ bingham_fit.search_slopes(p, stroke) for i, p in enumerate(free)]
         return np.asarray(-np.hstack(inner) / norm)
 
-    start = np.concatenate([to_search(s, stroke) for s in starts])
+    start = np.concatenate([bingham_fit.to_search(s, stroke) for s in starts])
     found = least_squares(
         residuals_at,
         np.clip(start, low + 1e-9, high - 1e-9),
         jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
-        xtol=TOLERANCE**0.75,
-        ftol=TOLERANCE**0.75,
-        gtol=TOLERANCE,
+        xtol=bingham_fit.TOLERANCE**0.75,
+        ftol=bingham_fit.TOLERANCE**0.75,
+        gtol=bingham_fit.TOLERANCE,
         max_nfev=60,
     )
     return parameters(found.x)
@@ -296,14 +289,17 @@ class MovingObjective:
 
     def residuals(self, free: Sequence[Bingham]) -> Array:
         """Compute the measured less simulated force (N,) at the counted samples [N]."""
-        values = dict(self.fixed) | dict(zip(self.free, free, strict=True))
-        damper = damper_with_nodes(self.nodes, [values[i] for i in range(self.nodes.size)])
+        values = self.fixed | dict(zip(self.free, free, strict=True))
+        rows = (
+            BaseRow(voltage_V=float(self.nodes[i]), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
+            for i, p in sorted(values.items())
+        )
+        damper = Damper(base=tuple(rows))
         forces = [
             respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
             for r, t, (motion, places) in zip(self.records, self.constant.prepared, self._motions, strict=True)
         ]
-        residuals: Array = self.constant.measured - np.concatenate(forces)
-        return residuals
+        return np.asarray(self.constant.measured - np.concatenate(forces))
 
     def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
         """Compute the derivatives (N, 3 f) of the force by T0, C, k of each free node, by difference quotients."""
@@ -321,15 +317,6 @@ class MovingObjective:
         """Return the share (N, m) of each node in the parameters at the counted samples."""
         pairs = zip(self.records, self.constant.prepared, strict=True)
         return np.concatenate([node_weights(self.nodes, voltage_of(r)[t.counted]) for r, t in pairs])
-
-
-def damper_with_nodes(nodes: Array, values: Sequence[Bingham]) -> Damper:
-    """Return the Bingham damper with these parameters at these voltages."""
-    rows = (
-        BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
-        for u, p in zip(nodes, values, strict=True)
-    )
-    return Damper(base=tuple(rows))
 
 
 def motion_of(record: Record) -> tuple[Motion, Rows]:

@@ -101,8 +101,7 @@ def in_motion(record: Record) -> NDArray[np.bool_]:
     friction. A hold between two motions counts.
     """
     order, (_, last) = np.arange(record.time.size), moving_range(record.displacement)
-    counted: NDArray[np.bool_] = (order >= warm_up(record.displacement)) & (order <= last + RELAXATION * record.rate)
-    return counted
+    return np.asarray((order >= warm_up(record.displacement)) & (order <= last + RELAXATION * record.rate))
 
 
 def warm_up(displacement: Array) -> int:
@@ -181,8 +180,7 @@ class FittedRecord:
             return np.full(self.residuals.size, -1)
         place = np.full(self.run.count + 1, -1)  # the last entry serves samples outside the run, whose index is -1
         place[self.whole_cycles] = np.arange(len(self.whole_cycles))
-        found: NDArray[np.int64] = place[self.run.number(self.record.time)][self.counted]
-        return found
+        return np.asarray(place[self.run.number(self.record.time)][self.counted])
 
     @cached_property
     def calm(self) -> NDArray[np.bool_]:

@@ -87,7 +87,7 @@ class Stroke:
             part = self.between(*STRAIGHT_PART)
             x, t = self.displacement[part], self.time[part]
             inner = self.between(*MIDDLE_PART)
-            force = _polynomial_value(self.displacement[inner] - self.middle, self.force[inner], 1, 0.0)
+            force = _value_at_zero(self.displacement[inner] - self.middle, self.force[inner], 1)
             return float(np.polyfit(t - t[0], x, 1)[0]), force
         course, half = self._course()
         fastest = _steepest_place(course)
@@ -95,7 +95,7 @@ class Stroke:
         s = (self.time[near] - self.time[near][0]) / half - 1.0 - fastest
         nearest = np.argsort(np.abs(s), kind="stable")
         nearest = nearest[: max(int(np.sum(np.abs(s) <= BESIDE_PEAK)), FEWEST_POINTS)]
-        return float(course.deriv()(fastest)) / half, _polynomial_value(s[nearest], self.force[near][nearest], 2, 0.0)
+        return float(course.deriv()(fastest)) / half, _value_at_zero(s[nearest], self.force[near][nearest], 2)
 
     @cached_property
     def _around_middle(self) -> slice:
@@ -138,9 +138,9 @@ class Stroke:
         return bool(np.sqrt(np.mean((self.displacement - ideal) ** 2)) <= SINUSOIDAL * self.length)
 
 
-def _polynomial_value(x: Array, values: Array, degree: int, place: float) -> float:
-    """Return the value at a place of the least-squares polynomial through values (n,) over x (n,)."""
-    return float(np.polynomial.Polynomial.fit(x, values, degree)(place))
+def _value_at_zero(x: Array, values: Array, degree: int) -> float:
+    """Return the value at x = 0 of the least-squares polynomial through values (n,) over x (n,)."""
+    return float(np.polynomial.Polynomial.fit(x, values, degree)(0.0))
 
 
 def _steepest_place(course: np.polynomial.Polynomial) -> float:

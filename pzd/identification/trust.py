@@ -41,16 +41,6 @@ EXACT_FIT = 1e-14
 
 
 @dataclass(frozen=True)
-class Trust:
-    """Status of one row of parameters."""
-
-    status: str
-    """`ok`, or `weak: ...`, `undetermined: ...` with the reason."""
-    determined: tuple[bool, ...]
-    """Whether each parameter is determined, so that its value is shown."""
-
-
-@dataclass(frozen=True)
 class ParameterEvidence:
     """Evidence of the data on one parameter."""
 
@@ -96,13 +86,19 @@ class ParameterEvidence:
         return SENSOR_ERROR / self.sensitivity if self.sensitivity > 0.0 else np.inf
 
 
-def trust_of(evidence: Sequence[ParameterEvidence]) -> Trust:
-    """Derive the status of a row from the evidence on its parameters."""
+def trust_of(evidence: Sequence[ParameterEvidence]) -> tuple[str, tuple[bool, ...]]:
+    """Derive the status of a row from the evidence on its parameters.
+
+    Returns
+    -------
+    `ok`, or `weak: ...`, `undetermined: ...` with the reason; and whether each parameter is determined, so that its
+    value is shown
+    """
     reasons = [e.undetermined() for e in evidence]
     weak = [None if reason else e.weak() for e, reason in zip(evidence, reasons, strict=True)]
     names = [e.name for e in evidence]
     clauses = [_clause("undetermined", names, reasons), _clause("weak", names, weak)]
-    return Trust("; ".join(clause for clause in clauses if clause) or "ok", tuple(reason is None for reason in reasons))
+    return "; ".join(clause for clause in clauses if clause) or "ok", tuple(reason is None for reason in reasons)
 
 
 def _clause(word: str, names: Sequence[str], reasons: Sequence[str | None]) -> str:
@@ -196,8 +192,7 @@ def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
         others = np.delete(np.arange(size.size), j)
         solved = np.linalg.lstsq(gram[np.ix_(others, others)], gram[others, j], rcond=1e-12)[0]
         shares[j] = np.sqrt(max(float(gram[j, j] - gram[others, j] @ solved), 0.0)) * size[j]
-    result: Array = shares / np.sqrt(energy)
-    return result
+    return np.asarray(shares / np.sqrt(energy))
 
 
 def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
@@ -205,8 +200,7 @@ def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
     size = np.linalg.norm(slopes, axis=0) * np.sqrt(residuals @ residuals)
     if float(residuals @ residuals) <= EXACT_FIT * energy:
         return np.zeros(size.size)
-    cosines: Array = np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0)
-    return cosines
+    return np.asarray(np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0))
 
 
 def displacement_noise(displacement: Array) -> float:
@@ -221,11 +215,12 @@ def displacement_noise(displacement: Array) -> float:
 
 def _doubt(left: float, misfit: Misfit) -> str | None:
     """Return the reason why all parameters are weak, however narrow their intervals: the model lacks something."""
-    missed = f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's"
-    much = f"the model leaves {left:.0%} of the force's r.m.s."
-    return (
-        "; ".join(words for words, true in ((missed, misfit.is_large), (much, left > LARGEST_RESIDUAL)) if true) or None
-    )
+    reasons = []
+    if misfit.is_large:
+        reasons.append(f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+    if left > LARGEST_RESIDUAL:
+        reasons.append(f"the model leaves {left:.0%} of the force's r.m.s.")
+    return "; ".join(reasons) or None
 
 
 def _not_converged(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:

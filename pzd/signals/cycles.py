@@ -97,8 +97,7 @@ class Cycles:
 
     def mean(self, time: Array, values: Array) -> Array:
         """Return the average cycle (points,)."""
-        average: Array = self.fold(time, values).mean(axis=0)
-        return average
+        return np.asarray(self.fold(time, values).mean(axis=0))
 
 
 def cycles(time: Array, displacement: Array) -> Cycles | None:
@@ -266,8 +265,7 @@ def drift_over_cycles(folded: Array) -> Array:
     degree = min(order.size - 1, 2)
     phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
     course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
-    found: Array = course(order[:, None] + phase)
-    return found
+    return np.asarray(course(order[:, None] + phase))
 
 
 def _cubic(time: Array, values: Array) -> Callable[[Array], Array]:

@@ -66,8 +66,7 @@ def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     cycle = jumps(run.mean(time, force))
     place = run.phase(time) * cycle.size
     before = np.floor(place).astype(np.int64) % cycle.size
-    found: Array = np.maximum(cycle[before], cycle[(before + 1) % cycle.size])
-    return found
+    return np.asarray(np.maximum(cycle[before], cycle[(before + 1) % cycle.size]))
 
 
 def jump_timing_error(measured: Array, predicted: Array) -> Array:
@@ -84,8 +83,7 @@ def jump_timing_error(measured: Array, predicted: Array) -> Array:
     around, beside = (_neighbours(force) for force in (predicted, measured))
     low, high = around.min(axis=0), around.max(axis=0)
     step = np.abs(np.diff(beside, axis=0)).max(axis=0)
-    found: Array = np.where(step >= 0.5 * (high - low), np.clip(measured, low, high) - predicted, 0.0)
-    return found
+    return np.asarray(np.where(step >= 0.5 * (high - low), np.clip(measured, low, high) - predicted, 0.0))
 
 
 def _neighbours(force: Array) -> Array:
@@ -134,8 +132,7 @@ def has_predecessors(counted: Mask, memory: int) -> Mask:
     (m - memory,) mask over the counted samples from number `memory` on
     """
     run = np.convolve(counted, np.ones(memory + 1, dtype=np.int64))[: counted.size]
-    whole: Mask = run[counted][memory:] == memory + 1
-    return whole
+    return np.asarray(run[counted][memory:] == memory + 1)
 
 
 # --- Steps of a control signal ---

@@ -73,8 +73,7 @@ def significant_harmonics(folded: Array) -> Array:
     kept[0] = True
     if folded.shape[1] % 2 == 0:
         kept[-1] = False
-    result: Array = kept
-    return result
+    return np.asarray(kept)
 
 
 def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
@@ -92,8 +91,7 @@ def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
     first = mean[0] - half * (mean[edge] - mean[0]) / (middle[edge] - middle[0])
     last = mean[-1] + half * (mean[-1] - mean[-1 - edge]) / (middle[-1] - middle[-1 - edge])
     knots = np.concatenate(([middle[0] - half], middle, [middle[-1] + half]))
-    drift: Array = np.interp(time, knots, np.concatenate(([first], mean, [last])))
-    return drift
+    return np.asarray(np.interp(time, knots, np.concatenate(([first], mean, [last]))))
 
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:

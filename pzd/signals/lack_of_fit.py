@@ -370,16 +370,13 @@ class _Windows:
     @property
     def power(self) -> Array:
         """Variance (windows,) of a coefficient as a share of that of the whole cycle, for white noise."""
-        shares: Array = np.sum(self.weights**2, axis=1) / self.points
-        return shares
+        return np.asarray(np.sum(self.weights**2, axis=1) / self.points)
 
     def coefficients(self, cycle: Array) -> Complex:
         """Return the Fourier coefficients of the windows (windows, frequencies), scaled like those of the cycle."""
-        found: Complex = np.fft.rfft(self.weights * cycle[self.samples], axis=1) / self.points
-        return found
+        return np.asarray(np.fft.rfft(self.weights * cycle[self.samples], axis=1) / self.points)
 
     def cycle(self, coefficients: Complex) -> Array:
         """Return the cycle (points,) of given coefficients of its windows."""
         parts: Array = self.weights * np.fft.irfft(coefficients, self.samples.shape[1], axis=1) * self.points
-        found: Array = np.bincount(self.samples.ravel(), parts.ravel(), self.points).astype(np.float64)
-        return found
+        return np.asarray(np.bincount(self.samples.ravel(), parts.ravel(), self.points).astype(np.float64))

@@ -124,8 +124,7 @@ class Autoregression:
         """
         j = np.arange(1, self.coefficients.size + 1)
         response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
-        density: Array = self.innovation / np.abs(response) ** 2
-        return density
+        return np.asarray(self.innovation / np.abs(response) ** 2)
 
     @property
     def whitening_filter(self) -> Array:
@@ -316,8 +315,7 @@ def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, s
     if noise.variance <= 0.0 or largest <= 0.0:
         return freedom
     independent = samples / max(largest / noise.variance, LEAST_COLOUR)
-    total: Array = 2.0 / (2.0 / freedom + 4.0 / independent * density / largest)
-    return total
+    return np.asarray(2.0 / (2.0 / freedom + 4.0 / independent * density / largest))
 
 
 def repeatable_power(error: PureError) -> Array:
@@ -333,5 +331,4 @@ def repeatable_power(error: PureError) -> Array:
     """
     weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
     repeats = np.abs(error.mean) ** 2 - error.single / error.count
-    power: Array = weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0)))
-    return power
+    return np.asarray(weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0))))

@@ -65,9 +65,8 @@ def nuisance_forces(
     normal = kept.T @ kept / weight + np.eye(columns.shape[1])
     estimate = np.linalg.solve(normal, kept.T @ residual[calm] / weight)
     within = np.clip(estimate, -NUISANCE_LIMIT, NUISANCE_LIMIT)
-    return columns[:, :FIRST_TIMING_COLUMN] @ within[:FIRST_TIMING_COLUMN], columns[:, FIRST_TIMING_COLUMN:] @ within[
-        FIRST_TIMING_COLUMN:
-    ]
+    of_size, of_timing = slice(FIRST_TIMING_COLUMN), slice(FIRST_TIMING_COLUMN, None)
+    return columns[:, of_size] @ within[of_size], columns[:, of_timing] @ within[of_timing]
 
 
 def nuisance_columns(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:

@@ -111,8 +111,7 @@ def mismatch(x: Array) -> Array:
     sums, squares = np.concatenate(([0.0], np.cumsum(x))), np.concatenate(([0.0], np.cumsum(x * x)))
     early, late = sums[overlap] / overlap, (sums[-1] - sums[lags]) / overlap
     variance = squares[overlap] / overlap - early**2 + (squares[-1] - squares[lags]) / overlap - late**2
-    result: Array = 1.0 - 2.0 * (products - early * late) / np.maximum(variance, np.finfo(float).tiny)
-    return result
+    return np.asarray(1.0 - 2.0 * (products - early * late) / np.maximum(variance, np.finfo(float).tiny))
 
 
 def _candidate_lags(x: Array) -> list[float]:
@@ -180,8 +179,7 @@ def _sliding_variance(x: Array, window: int) -> Array:
     x = x - x.mean()
     sums, squares = np.concatenate(([0.0], np.cumsum(x))), np.concatenate(([0.0], np.cumsum(x * x)))
     mean = (sums[window:] - sums[:-window]) / window
-    result: Array = np.maximum((squares[window:] - squares[:-window]) / window - mean**2, 0.0)
-    return result
+    return np.asarray(np.maximum((squares[window:] - squares[:-window]) / window - mean**2, 0.0))
 
 
 def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:

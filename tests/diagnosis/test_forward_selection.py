@@ -14,6 +14,7 @@ from pzd.damper.effect import Scales
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper, against_nature
 from pzd.damper.motion import Motion
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import prepare, split
@@ -201,8 +202,8 @@ def test_an_effect_that_is_not_searched_for_would_not_pay(
     whole = evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of(TWO)).whole
     before = fit(whole, (), whole.start())
     screened = {c.effect: c for c in searching.candidates(whole, before)}
-    monkeypatch.setattr(searching, "LEAST_DROP_IN_GAP", -np.inf)
-    monkeypatch.setattr(searching, "SHARE_WORTH_FITTING", -np.inf)
+    monkeypatch.setattr(thresholds, "LEAST_DROP_IN_GAP", -np.inf)
+    monkeypatch.setattr(thresholds, "SHARE_WORTH_FITTING", -np.inf)
     all_searched = searching.candidates(whole, before)
     assert all(c.searched for c in all_searched)
     left_out = [c for c in all_searched if not screened[c.effect].searched]

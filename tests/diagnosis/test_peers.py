@@ -136,8 +136,8 @@ def test_no_peer_is_fitted_to_a_held_out_test(rng: np.random.Generator) -> None:
     for group in range(len(TWO)):
         same = before.fitted(KWOK, form, group, fold).parameters
         assert after.fitted(KWOK, form, group, fold).parameters == pytest.approx(same, rel=1e-12)
-    seen = before.fitted(KWOK, form, 0, before.no_samples).parameters
-    assert after.fitted(KWOK, form, 0, after.no_samples).parameters != pytest.approx(seen, rel=0.1)
+    seen = before.fitted(KWOK, form, 0, before.folds.no_samples).parameters
+    assert after.fitted(KWOK, form, 0, after.folds.no_samples).parameters != pytest.approx(seen, rel=0.1)
 
 
 def peer_records(form: PeerForm, at: dict[float, Array], rng: np.random.Generator) -> list[Record]:
@@ -157,7 +157,7 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
     at = {U: low + U / 100.0 * (high - low) for U in THREE}
     tests = kept_back_tests(peer_records(BOUC_WEN.forms[1], at, rng), THREE)
     left_out = tests.interpolation_error(BOUC_WEN, 1)
-    form, _ = tests.best_form(BOUC_WEN, tests.no_samples, range(3))
+    form, _ = tests.best_form(BOUC_WEN, tests.folds.no_samples, range(3))
     assert form.label == "n = 2"
     assert left_out.records == tests.groups[1][1]
     assert left_out.criterion == pytest.approx(0.0, abs=1e-5)

@@ -110,12 +110,12 @@ def test_linearly_dependent_slopes_have_no_partial_sensitivity(rng: np.random.Ge
 
 
 def test_undetermined_and_weak_stand_in_one_status() -> None:
-    trust = trust_of(
+    status, determined = trust_of(
         [
             ParameterEvidence("T0", 100.0, 1.0, 1.0, 0.3),
             ParameterEvidence("C", 1000.0, 600.0, 600.0, 0.3),
             ParameterEvidence("k", 1e5, 2e4, 2e4, 0.3),
         ]
     )
-    assert trust.determined == (True, False, True)
-    assert trust.status == "undetermined: C (95 % interval of +-60 % by noise alone); weak: k (95 % interval of +-20 %)"
+    assert determined == (True, False, True)
+    assert status == "undetermined: C (95 % interval of +-60 % by noise alone); weak: k (95 % interval of +-20 %)"

@@ -13,6 +13,7 @@ the logarithm is halved and doubled.
 from __future__ import annotations
 
 import pickle
+import re
 import sys
 import tempfile
 import time
@@ -20,10 +21,12 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from hashlib import sha256
+from inspect import getsource
 from math import ceil
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -100,8 +103,8 @@ class Kept:
 
     def _thresholds(self) -> str:
         """Those that act inside of the function."""
-        within = vars(sys.modules[self.function.__module__])
-        return repr([within[name] for name in TABLE if name in within])
+        module = sys.modules[self.function.__module__]
+        return repr([getattr(thresholds, name) for name in TABLE if module in users(name)])
 
     def _said(self, given: Any) -> object:
         """What tells an argument from another one."""
@@ -154,17 +157,18 @@ def names() -> tuple[str, ...]:
     return (*TABLE, *IN_CONFIG)
 
 
-def users(name: str) -> list[Any]:
-    """The modules that have a threshold of the table."""
-    return [m for key, m in sys.modules.items() if key.startswith("pzd.diagnosis.") and name in vars(m)]
+@cache
+def users(name: str) -> tuple[ModuleType, ...]:
+    """The modules of the diagnosis that name a threshold of the table."""
+    named, package = re.compile(rf"\bthresholds\.{name}\b"), "pzd.diagnosis."
+    return tuple(m for key, m in sys.modules.items() if key.startswith(package) and named.search(getsource(m)))
 
 
 def acts_after(name: str) -> bool:
     """Whether a threshold acts on a search that is over and nowhere else."""
     if name in IN_CONFIG:
         return name in AFTER_IN_CONFIG
-    within = {module.__name__.removeprefix("pzd.diagnosis.") for module in users(name)} - {"thresholds"}
-    return within <= set(AFTER)
+    return {module.__name__.removeprefix("pzd.diagnosis.") for module in users(name)} <= set(AFTER)
 
 
 def scaled(name: str, value: Any, factor: float) -> Any:
@@ -180,18 +184,16 @@ def scaled(name: str, value: Any, factor: float) -> Any:
 
 @contextmanager
 def instead(name: str, factor: float, config: DiagnoseConfig) -> Iterator[DiagnoseConfig]:
-    """The config with a threshold at a multiple of its value, wherever it stands."""
+    """The config with a threshold at a multiple of its value, which stands in the config or in the table."""
     if name in IN_CONFIG:
         yield config.model_copy(update={name: scaled(name, getattr(config, name), factor)})
         return
-    value, where = getattr(thresholds, name), users(name)
-    for module in where:
-        setattr(module, name, scaled(name, value, factor))
+    value = getattr(thresholds, name)
+    setattr(thresholds, name, scaled(name, value, factor))
     try:
         yield config
     finally:
-        for module in where:
-            setattr(module, name, value)
+        setattr(thresholds, name, value)
 
 
 def searched(case: Case, config: DiagnoseConfig, *, checked: bool) -> Searched:

@@ -11,22 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 
+from pzd.blind.independent import stand
 from pzd.blind.independent.kernel import BinghamTable, Parameters, integrated
 from pzd.blind.independent.laws import LAWS, Scale, delayed_force, drift_factor, lagged_signal, signal_with_play
 from pzd.blind.independent.outside import OUTSIDE
-from pzd.blind.independent.stand import (
-    Actuator,
-    Chain,
-    Driven,
-    ErrorsOfTest,
-    LaboratoryCampaign,
-    campaign,
-    driven,
-    sensed_displacement,
-    sensed_force,
-    stamped,
-    warmed,
-)
+from pzd.blind.independent.stand import Actuator, Chain, Driven, ErrorsOfTest, LaboratoryCampaign
 from pzd.record import SAME_TEMPERATURE, Array
 
 GAPS = (0.008, 0.05)
@@ -119,7 +108,7 @@ class HiddenDamper:
         forces = [self.force(m, None) for m in motions]
         if not drifts:
             return forces, None
-        temperatures = warmed(motions, forces, self.start, _heat_capacity(motions, forces, rise))
+        temperatures = stand.warmed(motions, forces, self.start, _heat_capacity(motions, forces, rise))
         medians = [float(np.median(t[m.time >= 0.0])) for m, t in zip(motions, temperatures, strict=True)]
         return [self.force(m, t) for m, t in zip(motions, temperatures, strict=True)], medians
 
@@ -156,11 +145,11 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
     hidden : names of laws
     """
     rng = default_rng(SeedSequence(seed, spawn_key=(index, 2)))
-    run = campaign(campaign_name, rng)
+    run = stand.campaign(campaign_name, rng)
     base, actuator = BinghamTable.drawn(run.values, rng), Actuator.drawn(rng)
     phases = int(rng.integers(1 << 31))
     fine, coarse = (
-        [driven(run, t, actuator, default_rng([phases, i]), rough) for i, t in enumerate(run.tests)]
+        [stand.driven(run, t, actuator, default_rng([phases, i]), rough) for i, t in enumerate(run.tests)]
         for rough in (False, True)
     )
     start, rise = float(rng.uniform(18.0, 26.0)), float(np.exp(rng.uniform(np.log(0.5), np.log(8.0))))
@@ -173,7 +162,7 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
     temperatures: list[Array] | list[None] = [None] * len(fine)
     if heated:
         unheated = [damper.force(m, None) for m in fine]
-        temperatures = warmed(fine, unheated, start, _heat_capacity(fine, unheated, rise))
+        temperatures = stand.warmed(fine, unheated, start, _heat_capacity(fine, unheated, rise))
     forces = [damper.force(m, t) for m, t in zip(fine, temperatures, strict=True)]
     peak = max(float(np.max(np.abs(f))) for f in forces)
     chain = Chain.drawn(rng, peak, scale.stroke, run.rate)
@@ -250,9 +239,9 @@ def _logged(
     errors = ErrorsOfTest.drawn(rng, float(np.max(np.abs(true))))
     # keyword arguments are drawn in this order, which a seed depends on
     return LoggedTest(
-        time=stamped(time, chain),
-        displacement=sensed_displacement(time, x, chain, errors, rng),
-        force=sensed_force(time, true, peak, chain, errors, rng),
+        time=stand.stamped(time, chain),
+        displacement=stand.sensed_displacement(time, x, chain, errors, rng),
+        force=stand.sensed_force(time, true, peak, chain, errors, rng),
         signal=_sensed_signal(motion.signal[at], signal_values, rng) if len(signal_values) > 1 else None,
         temperature=None if temperature is None else np.round(temperature[at] + rng.normal(0.0, 0.05, at.size), 2),
         true_displacement=x + chain.displacement_zero,
@@ -307,7 +296,8 @@ def gap_after_refit(
     groups = _groups([0.0] * len(tests) if temperatures is None else temperatures)
     for i, value in enumerate(values):
         for group in groups:
-            own = [tests[j] for j in group if _is_constant_at(tests[j][0], value)]
+            in_group = (tests[j] for j in group)
+            own = [(m, f) for m, f in in_group if m.test.signal == "constant" and m.test.value == value]
             if not own:
                 continue
             z, residual = _refit(own, (base.T0[i], base.C[i], base.k[i]), known)
@@ -320,10 +310,6 @@ def gap_after_refit(
             residual = _residual(m, f, (T0, C, k), known)
             squares, count = squares + float(residual @ residual), count + residual.size
     return float(np.sqrt(squares / count))
-
-
-def _is_constant_at(motion: Driven, value: float) -> bool:
-    return motion.test.signal == "constant" and motion.test.value == value
 
 
 def _groups(temperatures: Sequence[float]) -> list[list[int]]:

@@ -111,6 +111,11 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     )
 
 
+def refit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
+    """Fit a damper with the effects that it has, from its present parameters; see `fit`."""
+    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
+
+
 def projected_out(frame: Array, values: Array) -> Array:
     """Project values (w,) or (w, c) onto the complement of orthonormal columns (w, p)."""
     return values - frame @ (frame.T @ values)
@@ -182,11 +187,8 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
     low, high = start - LARGEST_LOG_RATIO, start + LARGEST_LOG_RATIO
     low[:, 0], high[:, 0] = 0.0, 2.0
     high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFNESS_MARGIN * problem.largest_rate))
-    limits = [u.bounds for u in unknowns]
-    return (
-        np.array([*low.ravel(), *(lower for lower, _ in limits)]),
-        np.array([*high.ravel(), *(upper for _, upper in limits)]),
-    )
+    bounds = np.reshape([u.bounds for u in unknowns], (-1, 2))
+    return np.concatenate([low.ravel(), bounds[:, 0]]), np.concatenate([high.ravel(), bounds[:, 1]])
 
 
 def _covariance(jacobian: Array) -> Array:
@@ -219,8 +221,7 @@ def standard_errors(fitted: FitResult) -> Array:
     of_effects = slice(fitted.optimum.size - len(fitted.unknowns), fitted.optimum.size)
     searched = fitted.optimum[of_effects]
     slopes = np.array([u.derivative(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
-    errors: Array = np.abs(slopes) * _search_errors(fitted, of_effects)
-    return errors
+    return np.asarray(np.abs(slopes) * _search_errors(fitted, of_effects))
 
 
 def base_half_widths(fitted: FitResult, force: float) -> Array:
@@ -235,16 +236,14 @@ def base_half_widths(fitted: FitResult, force: float) -> Array:
     """
     of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
     units = np.array([(force, row.C_Ns_per_m, row.k_N_per_m) for row in fitted.damper.base])
-    widths: Array = LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units
-    return widths
+    return np.asarray(LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units)
 
 
 def _search_errors(fitted: FitResult, of: slice) -> Array:
     """Compute the standard errors of some search variables."""
     freedom = max(fitted.size - fitted.optimum.size, 1)
     wider = np.maximum(disagreement(fitted, of), max(1.0, fitted.misfit / freedom))
-    errors: Array = np.sqrt(np.diag(fitted.covariance)[of] * wider)
-    return errors
+    return np.asarray(np.sqrt(np.diag(fitted.covariance)[of] * wider))
 
 
 def disagreement(fitted: FitResult, of: slice) -> Array:

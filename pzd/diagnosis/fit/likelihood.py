@@ -394,14 +394,8 @@ def _from_samples(
     noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
     peak = float(np.max(np.abs(measured)))
     alike = _samples_per_harmonic(record)
-    left = (
-        alike
-        * (
-            DISCREPANCY
-            * _model_discrepancy(measured, force[mask], gradient_within_stretches(force[mask], mask), noise.variance)
-        )
-        ** 2
-    )
+    slope = gradient_within_stretches(force[mask], mask)
+    left = alike * (DISCREPANCY * _model_discrepancy(measured, force[mask], slope, noise.variance)) ** 2
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
@@ -438,8 +432,6 @@ def with_nuisances(
     """Integrate out the test's own offset, gain and delay, jumps and instants of the voltage.
 
     Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
-
-    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
 
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.

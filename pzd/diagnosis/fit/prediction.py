@@ -109,8 +109,7 @@ def _stepping(record: Record) -> NDArray[np.bool_]:
         return steps
     width = int(np.ceil(NEAR_STEP * record.rate))
     near = np.convolve(steps, np.ones(2 * width + 2))[width : width + size]
-    beside: NDArray[np.bool_] = near > 0.5
-    return beside
+    return np.asarray(near > 0.5)
 
 
 # --- Predicted force with its uncertainty

@@ -9,17 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.damper import parameter_rows
 from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
-from pzd.damper.parameter_rows import (
-    constant_rows,
-    drive_row_of,
-    element_rows,
-    material_factors,
-    parallel_rows,
-    rows_along,
-)
 from pzd.damper.path import Variables
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
 from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
@@ -53,15 +46,12 @@ class KernelInputs:
     def _interpolated(self, at_nodes: Array) -> Array:
         if self.nodes is None or self.effective_voltage is None:
             return at_nodes
-        return rows_along(self.nodes, at_nodes, self.effective_voltage)
+        return parameter_rows.rows_along(self.nodes, at_nodes, self.effective_voltage)
 
     def difference_to(self, other: KernelInputs) -> Array:
         """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
-        mine, others = (
-            (self.at_nodes, other.at_nodes)
-            if self.effective_voltage is other.effective_voltage
-            else (self.rows, other.rows)
-        )
+        same_voltage = self.effective_voltage is other.effective_voltage
+        mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
         shape = np.broadcast_shapes(mine.shape, others.shape)
         return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
@@ -71,11 +61,9 @@ class KernelInputs:
 
     def parallel_force(self, o: WeightedRecord) -> Array:
         """Compute the (m,) parallel force [N]; (1,) a zero without any."""
-        return (
-            np.zeros(1)
-            if self.parallel is None
-            else parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
-        )
+        if self.parallel is None:
+            return np.zeros(1)
+        return parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
 
 
 def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
@@ -86,12 +74,13 @@ def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
 def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     friction, damping, stiffness = point.base[o.base_row]
     effects = point.effects_at(o.base_row)
-    rows, parallel = constant_rows(friction, damping, stiffness, effects)
+    rows, parallel = parameter_rows.constant_rows(friction, damping, stiffness, effects)
     places = {name: known()[name].place for name in effects}
     acting = {name: values for name, values in effects.items() if places[name] == "material"}
     if acting:
         given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
-        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference_temperature)
+        temperature = constant_value(o.motion.temperature)
+        factors = parameter_rows.material_factors(given, temperature, point.problem.reference_temperature)
         rows = np.repeat(rows, len(factors), axis=0)
         rows[:, : len(ELEMENT)] *= factors
     sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
@@ -100,10 +89,11 @@ def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
 
 def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     damper, temperature = point.damper, constant_value(o.motion.temperature)
-    effective = o.effective_voltage(drive_row_of(damper).tobytes())
-    parallel, sensors = parallel_rows(damper, effective), sensors_of(damper)
+    effective = o.effective_voltage(parameter_rows.drive_row_of(damper).tobytes())
+    parallel, sensors = parameter_rows.parallel_rows(damper, effective), sensors_of(damper)
     if temperature is not None and temperature.size > 1:
-        return KernelInputs(element_rows(damper, effective, temperature), parallel, sensors, point.displacement_zero)
+        rows = parameter_rows.element_rows(damper, effective, temperature)
+        return KernelInputs(rows, parallel, sensors, point.displacement_zero)
     nodes = point.nodes(None if temperature is None else float(temperature[0]))
     return KernelInputs(nodes.rows, parallel, sensors, point.displacement_zero, nodes.voltages, effective)
 
@@ -138,11 +128,6 @@ def search_directions(
     moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
     along = [here.along_motion(change[:, moved]) for change in changes]
     return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
-
-
-def independent_of_temperature(point: Point) -> bool:
-    """Whether observations of one base row share their kernel inputs: nothing depends on the temperature of each."""
-    return all(known()[name].place != "material" for name in point.effects)
 
 
 def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
@@ -180,9 +165,8 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
     shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
-            shown[:, 1 + j] += (
-                o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
-            ) / width
+            change = o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
+            shown[:, 1 + j] += change / width
     compared = o.at_compared(shown)
     return compared[:, 0], compared[:, 1:]
 
@@ -287,11 +271,8 @@ def _sensitivities_at(
     """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
     low, high = limits
     free = low.size
-    point, below, above = (
-        problem.point(x, unknowns),
-        np.maximum(x[:free] - STEP, low),
-        np.minimum(x[:free] + STEP, high),
-    )
+    point = problem.point(x, unknowns)
+    below, above = np.maximum(x[:free] - STEP, low), np.minimum(x[:free] + STEP, high)
 
     def moved(j: int, value: float) -> Point:
         return problem.point(np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns)
@@ -299,7 +280,8 @@ def _sensitivities_at(
     columns_wanted = range(free) if wanted is None else wanted
     neighbours = {j: (moved(j, below[j]), moved(j, above[j]), float(above[j] - below[j])) for j in columns_wanted}
     # Observations of one base row share their directions, unless a material effect goes by the temperature of each.
-    shared, cached = independent_of_temperature(point), dict[int, SearchDirections]()
+    shared = all(known()[name].place != "material" for name in point.effects)
+    cached = dict[int, SearchDirections]()
     for o in problem.observations:
         columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)
         if o.base_row not in cached or o.base_row < 0 or not shared:

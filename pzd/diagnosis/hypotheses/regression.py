@@ -14,13 +14,13 @@ import numpy as np
 
 from pzd.damper.confounders import known
 from pzd.damper.model import Damper
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import nearest_row
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, assign_folds, standard_error
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.gap import ResidualCheck, jump_bend
 from pzd.diagnosis.hypotheses.shapes import Shape, Signals, shapes_of, signals_of
-from pzd.diagnosis.thresholds import PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
@@ -161,7 +161,7 @@ class Regression:
         scatter = standard_error(better)
         errors = float(better.mean()) / scatter if scatter > 0.0 else np.inf
         gap = float(weight @ np.maximum(baseline.error - noise, 0.0))
-        if errors <= PREDICTION_STANDARD_ERRORS or gap <= 0.0:
+        if errors <= thresholds.PREDICTION_STANDARD_ERRORS or gap <= 0.0:
             return None
         closes = float(weight @ (baseline.error - after.error)) / gap
         return PredictingShapes(tuple(candidates), after, min(closes, 1.0), errors)

@@ -67,15 +67,6 @@ Columns = Callable[[Signals], Iterator[tuple[float | None, Array]]]
 """
 
 
-def one_column(function: Callable[[Signals], Array]) -> Columns:
-    """Return the columns of a shape without a searched parameter."""
-
-    def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
-        yield None, np.asarray(function(s))[:, None]
-
-    return columns
-
-
 def waves(s: Signals) -> Iterator[tuple[float | None, Array]]:
     """Yield sine and cosine over the position for each wave length [m]."""
     for length in (share * s.half_stroke for share in LENGTHS):
@@ -203,7 +194,12 @@ def _shape(
     needs: Needs | None = None,
     library: tuple[str, ...] = (),
 ) -> Shape:
-    return Shape(name, unit, physics, source, one_column(function), law=law, needs=needs, library=library)
+    """Return a shape of one column, without a searched parameter."""
+
+    def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
+        yield None, np.asarray(function(s))[:, None]
+
+    return Shape(name, unit, physics, source, columns, law=law, needs=needs, library=library)
 
 
 _DIXON = "Dixon 2007, The Shock Absorber Handbook"
@@ -327,6 +323,5 @@ def _by_control(shape: Shape) -> Shape:
         unit=f"{shape.unit}/V",
         physics=f"{shape.physics}, in proportion to the control signal",
         columns=columns,
-        law=shape.law,
         per_control=True,
     )

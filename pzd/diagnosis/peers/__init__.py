@@ -93,8 +93,7 @@ class Peer:
     def force(self, form: PeerForm, motion: StrokeMotion, parameters: Array) -> Array:
         """Compute the (n,) force of one form along a motion [N], with (p,) values in the order of `parameters`."""
         count = len(self.coefficients)
-        force: Array = form.columns(motion, parameters[count:]) @ parameters[:count]
-        return force
+        return np.asarray(form.columns(motion, parameters[count:]) @ parameters[:count])
 
 
 @cache

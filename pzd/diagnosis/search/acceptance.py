@@ -10,27 +10,16 @@ import numpy as np
 from pzd.damper.effect import Effect, Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, fit, profiled_misfit, projected_out, standard_errors
+from pzd.diagnosis.fit import least_squares
+from pzd.diagnosis.fit.least_squares import LEVEL, FitResult
 from pzd.diagnosis.fit.likelihood import simulated_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, starts_of, towards_neutral
-from pzd.diagnosis.thresholds import (
-    END_STOP_BEGINS,
-    END_STOP_OTHER_SIDE,
-    HALVES_ALIKE,
-    HALVES_LOSS,
-    HALVES_SIGNIFICANCE,
-    LEAST_CLOSED,
-    LINEARISED_FROM_ZERO,
-    LINEARISED_SHARE,
-    NUISANCE_EFFECTS,
-    SIZES_AVERAGED,
-    TRIVIAL_SIZE,
-)
 from pzd.record import Array
 
 WITHIN_TEST_SCATTER = "so small that it counts as an offset or a delay of the tests"
@@ -46,20 +35,18 @@ def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: 
         return f"moves the force by less than {100 * config.visible:g} % of peak"
     if small := trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
         return small
-    return (
-        misplaced_end_stop(candidate.fitted.damper, evidence.whole.scales.stroke)
-        if candidate.effect == "end_stop"
-        else None
-    )
+    if candidate.effect == "end_stop":
+        return misplaced_end_stop(candidate.fitted.damper, evidence.whole.scales.stroke)
+    return None
 
 
 def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
     """Say why an end stop is none by where it begins; None where that is near both ends of the half stroke [m]."""
     begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
     further, nearer = (stroke - float(np.max(begins)) + side * abs(damper.zero_m) for side in (1.0, -1.0))
-    if nearer <= 0.0 or nearer**2 < END_STOP_OTHER_SIDE * further**2:
+    if nearer <= 0.0 or nearer**2 < thresholds.END_STOP_OTHER_SIDE * further**2:
         return "stand-in: acts at one end of the stroke alone"
-    if float(np.min(begins)) - abs(damper.zero_m) < END_STOP_BEGINS * stroke:
+    if float(np.min(begins)) - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
     return None
 
@@ -70,10 +57,10 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, ca
         return None
     checks = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
     gaps = [[size(each) for each in checks] for size in (visible_gap, gap_in_force)]
-    closed = [left**2 <= (1.0 - LEAST_CLOSED) * open_before**2 for open_before, left in gaps]
+    closed = [left**2 <= (1.0 - thresholds.LEAST_CLOSED) * open_before**2 for open_before, left in gaps]
     if any(closed) and all(left <= open_before for open_before, left in gaps):
         return None
-    return f"stand-in: closes less than {LEAST_CLOSED:.0%} of the gap, or widens it"
+    return f"stand-in: closes less than {thresholds.LEAST_CLOSED:.0%} of the gap, or widens it"
 
 
 def closes_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate) -> bool:
@@ -90,7 +77,7 @@ def trivial_size(effect: str, parameter: Parameter, force: float) -> float | Non
     parameter : of the effect
     force : the lowest peak of the tests [N]
     """
-    limit = TRIVIAL_SIZE.get((effect, parameter.name))
+    limit = thresholds.TRIVIAL_SIZE.get((effect, parameter.name))
     return limit if limit is None or parameter.unit != "N" else limit * force
 
 
@@ -100,13 +87,13 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     Parameters
     ----------
     fitted : optimum with the effect
-    effect : its name; there is no reason where it is none of `OF_EACH_TEST`
+    effect : its name; there is no reason where it is none of `thresholds.NUISANCE_EFFECTS`
     force : the lowest peak of the tests [N]
     """
-    if effect not in NUISANCE_EFFECTS:
+    if effect not in thresholds.NUISANCE_EFFECTS:
         return None
     sizes = []
-    for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
+    for unknown, error in zip(fitted.unknowns, least_squares.standard_errors(fitted), strict=True):
         if unknown.effect == effect and (unit := trivial_size(effect, unknown.parameter, force)) is not None:
             sizes.append((abs(unknown.value_in(fitted.damper)) / unit, LEVEL * error / unit))
     if not sizes or max(size - width for size, width in sizes) >= 1.0:
@@ -130,16 +117,13 @@ def spurious(
     halves = weighed.halves
     if any(not half.observations for half in halves):
         return None
-    fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted.damper)) for half in halves]
-    without = fit(evidence.halves[0], before.effects, before.optimum)
-    with_it, left = (
-        profiled_misfit(halves[1], fits[0].damper),
-        profiled_misfit(evidence.validation_problem(weighed), without.damper),
-    )
-    if with_it > left + config.rival_bic:
+    fits = [least_squares.refit(half, candidate.fitted.damper) for half in halves]
+    without = least_squares.fit(evidence.halves[0], before.effects, before.optimum)
+    left = least_squares.profiled_misfit(evidence.validation_problem(weighed), without.damper)
+    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
-    if not _halves_agree(halves, (fits[0], fits[1]), fresh, HALVES_LOSS * -candidate.delta_bic):
+    if not _halves_agree(halves, (fits[0], fits[1]), fresh, thresholds.HALVES_LOSS * -candidate.delta_bic):
         return "stand-in: takes other values on either half of the tests"
     return None
 
@@ -163,12 +147,12 @@ def _halves_agree(
     values = [
         [u.value_in(f.damper) for u in f.unknowns if u.effect in effects and u.parameter is not ZERO] for f in fits
     ]
-    if all(abs(a - b) <= HALVES_ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
+    if all(abs(a - b) <= thresholds.HALVES_ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
         return True
-    limit = 2.0 * float(chdtri(len(fits[0].unknowns), HALVES_SIGNIFICANCE))
+    limit = 2.0 * float(chdtri(len(fits[0].unknowns), thresholds.HALVES_SIGNIFICANCE))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
         spread = max(1.0, own.misfit / max(own.size - own.optimum.size, 1))
-        if profiled_misfit(half, other.damper) - own.misfit <= max(limit * spread, negligible):
+        if least_squares.profiled_misfit(half, other.damper) - own.misfit <= max(limit * spread, negligible):
             return True
     return False
 
@@ -218,10 +202,10 @@ class Detection:
         """
         from scipy.special import logsumexp
 
-        share = (np.arange(SIZES_AVERAGED) + 0.5) / SIZES_AVERAGED
+        share = (np.arange(thresholds.SIZES_AVERAGED) + 0.5) / thresholds.SIZES_AVERAGED
         away = (low * (high / low) ** share - self.size) / self.error
         known = max(self.size, low) / self.error
-        mean = logsumexp(-0.5 * away**2) - np.log(SIZES_AVERAGED)
+        mean = logsumexp(-0.5 * away**2) - np.log(thresholds.SIZES_AVERAGED)
         return float(0.5 * self.gain - 0.5 * self.shape_parameters * np.log1p(known**2) + mean)
 
 
@@ -296,7 +280,7 @@ class _TangentSpace:
     def gap(self, simulated: Sequence[Array]) -> float:
         """Compute the r.m.s. change of the force that no other values of the present variables would bring about."""
         changed = (np.concatenate(simulated) - np.concatenate(self.before.simulated)) / self.units
-        return float(np.linalg.norm(projected_out(self.forces, changed)))
+        return float(np.linalg.norm(least_squares.projected_out(self.forces, changed)))
 
     def of_trace(self, effect: Effect, trace: Array) -> Detection | None:
         """Estimate the gap of an effect that was not searched for; None where it shows nowhere or is impossible.
@@ -320,7 +304,7 @@ class _TangentSpace:
         simulated = [simulated_force(o, damper) for o in problem.observations]
         left = [o.standardised(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
         residual = np.concatenate(before.residuals)
-        rest = projected_out(self.before.column_basis, np.concatenate(left) - residual)
+        rest = least_squares.projected_out(self.before.column_basis, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None
@@ -332,8 +316,9 @@ class _TangentSpace:
 def _traces(problem: Problem, before: FitResult, effect: Effect) -> Iterator[Array]:
     """Yield small values of an effect in the units of the search, to either side where it starts from zero."""
     for start in starts_of(problem, before, effect):
-        faint = towards_neutral(problem, before, effect, start, LINEARISED_SHARE)
-        yield from (faint,) if np.any(faint) else (faint + LINEARISED_FROM_ZERO, faint - LINEARISED_FROM_ZERO)
+        faint = towards_neutral(problem, before, effect, start, thresholds.LINEARISED_SHARE)
+        away = thresholds.LINEARISED_FROM_ZERO
+        yield from (faint,) if np.any(faint) else (faint + away, faint - away)
 
 
 # --- Outcome of the search

@@ -12,25 +12,11 @@ import numpy as np
 from pzd.damper.confounders import confounders, known
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library, nameable
-from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, projected_out
+from pzd.diagnosis import thresholds
+from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, projected_out, refit
 from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
-from pzd.diagnosis.thresholds import (
-    FIRST_EVALUATIONS,
-    LEAST_DROP_IN_GAP,
-    LEAST_DROP_IN_NOISE,
-    LINEARISED_SHARE,
-    MOST_EVALUATIONS_OF_BEST,
-    MOVING_VOLTAGE,
-    NEARLY_AS_GOOD,
-    SEARCH_LIMIT_MARGIN,
-    SHARE_WORTH_FITTING,
-    SHARE_WORTH_SEARCHING,
-    SMALLER_STARTS,
-    STARTS_TRIED,
-    STUCK_MISFIT,
-)
 from pzd.record import Array
 
 # --- Starting values, and the drop in misfit that a linearised step promises from each
@@ -62,8 +48,9 @@ def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
     """Compute the largest drop in misfit that a linearised step promises, from the starts or from near zero."""
     starts = starts_of(problem, before, effect)
-    faint = (*starts, *(towards_neutral(problem, before, effect, start, LINEARISED_SHARE) for start in starts))
-    return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
+    share = thresholds.LINEARISED_SHARE
+    faint = [towards_neutral(problem, before, effect, start, share) for start in starts]
+    return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in (*starts, *faint))
 
 
 def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array]:
@@ -142,7 +129,7 @@ class Candidate:
 def testable(problem: Problem, effect: Effect) -> bool:
     """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
     if effect.needs == "voltage":
-        span = MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
+        span = thresholds.MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
         return any(o.motion.voltage is not None and np.ptp(o.motion.voltage) > span for o in problem.observations)
     if effect.needs == "temperature":
         by_row: dict[int, list[float]] = {}
@@ -185,13 +172,14 @@ def candidates(
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         gains = list(pool.map(promised, tried))
         best = max((gain for gain in gains if np.isfinite(gain)), default=0.0)
-        least = max(LEAST_DROP_IN_NOISE if silent else LEAST_DROP_IN_GAP, SHARE_WORTH_FITTING * best)
+        drop = thresholds.LEAST_DROP_IN_NOISE if silent else thresholds.LEAST_DROP_IN_GAP
+        least = max(drop, thresholds.SHARE_WORTH_FITTING * best)
 
         def one(effect: Effect, gain: float) -> Candidate:
             return (candidate if gain >= least else _unsearched)(problem, before, effect)
 
         found = list(pool.map(one, tried, gains))
-        worth = SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
+        worth = thresholds.SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
         found = list(pool.map(lambda c: resumed(problem, before, c) if c.delta_bic < worth else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
@@ -209,12 +197,12 @@ def candidate(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
     """
     problem, reached = _problem_for(problem, effect), list[Candidate]()
     starts = sorted_starts(problem, before, effect)
-    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in SMALLER_STARTS)
-    for start in itertools.chain(starts[:STARTS_TRIED], faint):
+    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in thresholds.SMALLER_STARTS)
+    for start in itertools.chain(starts[: thresholds.STARTS_TRIED], faint):
         whole_start = np.concatenate([_search_start(problem, before), start])
-        reached.append(_fitted_from(problem, before, effect.name, whole_start, FIRST_EVALUATIONS))
+        reached.append(_fitted_from(problem, before, effect.name, whole_start, thresholds.FIRST_EVALUATIONS))
         fitted = reached[-1].fitted
-        if fitted.misfit <= before.misfit + STUCK_MISFIT or _switched_off(effect, fitted):
+        if fitted.misfit <= before.misfit + thresholds.STUCK_MISFIT or _switched_off(effect, fitted):
             break
     return min(reached, key=lambda c: c.fitted.misfit)
 
@@ -223,15 +211,14 @@ def _switched_off(effect: Effect, fitted: FitResult) -> bool:
     """Whether the search for an effect's only parameter ended at the limit next to zero, its absence."""
     (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
     vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
-    return vanishes and bool(fitted.optimum[-1] - nearest < SEARCH_LIMIT_MARGIN)
+    return vanishes and bool(fitted.optimum[-1] - nearest < thresholds.SEARCH_LIMIT_MARGIN)
 
 
 def _unsearched(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
     """Return an effect at the faintest values tried, without a search."""
-    start = towards_neutral(problem, before, effect, starts_of(problem, before, effect)[0], SMALLER_STARTS[-1])
-    return replace(
-        _fitted_from(problem, before, effect.name, np.concatenate([before.optimum, start]), 1), searched=False
-    )
+    first, share = starts_of(problem, before, effect)[0], thresholds.SMALLER_STARTS[-1]
+    start = np.concatenate([before.optimum, towards_neutral(problem, before, effect, first, share)])
+    return replace(_fitted_from(problem, before, effect.name, start, 1), searched=False)
 
 
 def best_confounder(problem: Problem, before: FitResult) -> Candidate:
@@ -253,7 +240,7 @@ def _fitted_per_voltage(
     problem: Problem, before: FitResult, effect: str, evaluations: int = MOST_EVALUATIONS
 ) -> Candidate:
     wider = replace(problem, per_voltage=problem.per_voltage | {effect})
-    fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
+    fitted = refit(wider, before.damper, evaluations)
     return replace(as_candidate(problem, before, effect, fitted), varies=True)
 
 
@@ -275,20 +262,20 @@ def as_candidate(
 def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
     """Search a candidate to its optimum, from all its starting values."""
     if found.varies:
-        return _fitted_per_voltage(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
+        return _fitted_per_voltage(problem, before, found.effect, thresholds.MOST_EVALUATIONS_OF_BEST)
     effect = known()[found.effect]
     problem = _problem_for(problem, effect)
     others = [np.concatenate([_search_start(problem, before), s]) for s in sorted_starts(problem, before, effect)[1:]]
     fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
-    return _fitted_from(problem, before, found.effect, best.optimum, MOST_EVALUATIONS_OF_BEST)
+    return _fitted_from(problem, before, found.effect, best.optimum, thresholds.MOST_EVALUATIONS_OF_BEST)
 
 
 def nearly_as_good(
     problem: Problem, before: FitResult, chosen: Candidate, tried: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
     """Return the candidates of a step, those nearly as good as the chosen one searched to their optimum as well."""
-    near = NEARLY_AS_GOOD * chosen.delta_bic
+    near = thresholds.NEARLY_AS_GOOD * chosen.delta_bic
     return tuple(
         converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
     )
@@ -313,7 +300,7 @@ def _fitted_from(
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
         # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.
-        pooled = fit(problem, before.effects, problem.start_with(before.damper))
+        pooled = refit(problem, before.damper)
         own = len(fitted.unknowns) - len(before.unknowns)
         alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
         pays = max(pays, alone, delta_bic(pooled, fitted))

@@ -12,24 +12,13 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import FitResult, fit, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.search.acceptance import (
-    MAY_BE_CHANCE,
-    MAY_BE_TEST_SCATTER,
-    ConfounderMatch,
-    Detection,
-    Selection,
-    SelectionStep,
-    closes_gap,
-    detections,
-    insufficient_support,
-    leaves_gap,
-    rivals_of,
-    spurious,
-)
+from pzd.diagnosis.search import acceptance
+from pzd.diagnosis.search.acceptance import ConfounderMatch, Detection, Selection, SelectionStep
 from pzd.diagnosis.search.candidates import (
     Candidate,
     as_candidate,
@@ -42,7 +31,6 @@ from pzd.diagnosis.search.candidates import (
     nearly_as_good,
     per_voltage_candidates,
 )
-from pzd.diagnosis.thresholds import CONVERGED_CHANGE, LARGEST_GAP_GROWTH, MOST_REWEIGHTINGS
 
 
 def reweighted(
@@ -58,11 +46,11 @@ def reweighted(
     evidence : of the present optimum
     current : optimum with the adopted effects
     """
-    for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
+    for _ in range(thresholds.MOST_REWEIGHTINGS if current.effects else 0):
         before, evidence = current, weigh(current.damper)
-        current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
+        current = refit(evidence.whole, before.damper)
         moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
-        if np.all(moved <= CONVERGED_CHANGE * standard_errors(current)):
+        if np.all(moved <= thresholds.CONVERGED_CHANGE * standard_errors(current)):
             break
     return evidence, current
 
@@ -101,7 +89,8 @@ def swap_step(
     spurious_effects = frozenset(c.effect for c in close if refused(c))
     alike = [c for c in close if c.effect not in spurious_effects]
     kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
-    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), spurious_effects), kept
+    rivals = acceptance.rivals_of(kept, (*alike, own), config)
+    return SelectionStep(tuple(ended), kept.effect, rivals, spurious_effects), kept
 
 
 def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
@@ -180,13 +169,13 @@ class _ForwardSelection:
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        effects, damper = self.current.effects, self.current.damper
+        damper = self.current.damper
         kept = {"effects": damper.effects, "zero_m": damper.zero_m}
         whole = self.weigh(self.identified.model_copy(update=kept)).whole
         pooled = whole.pooled_temperatures()
-        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, pooled))
+        rows, one = (refit(problem, damper) for problem in (whole, pooled))
         pays = delta_bic(one, rows)
-        if pays <= self.config.adopt_bic and not effects:
+        if pays <= self.config.adopt_bic and not damper.effects:
             drifts = tuple(name for name, effect in library().items() if effect.place == "material")
             tried = candidates(pooled, one, (*self.config.forbid, *drifts), self.jobs)
             pays -= min((c.delta_bic for c in tried), default=0.0)
@@ -232,7 +221,7 @@ class _ForwardSelection:
         return None
 
     def _reason_against(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
-        return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+        return acceptance.insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
     def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
         """Say why a candidate is spurious by the gap that it leaves, weighed by the residual without it and with it.
@@ -240,12 +229,11 @@ class _ForwardSelection:
         What is left without it is slow: with these weights the fit follows what is quick, where the displacement is
         known worst, and T0, C and k are bent.
         """
-        reason = leaves_gap(evidence, self.config, before, each)
+        reason = acceptance.leaves_gap(evidence, self.config, before, each)
         if reason is None or each.varies:
             return reason
-        whole = self.weigh(each.fitted.damper).whole
-        again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
-        return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
+        again = refit(self.weigh(each.fitted.damper).whole, each.fitted.damper)
+        return acceptance.leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
@@ -254,7 +242,7 @@ class _ForwardSelection:
         lead = next(leads, None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
-            self.open_detections = detections(self.evidence.whole, self.current, tried)
+            self.open_detections = acceptance.detections(self.evidence.whole, self.current, tried)
             # Once noise explains what is left, the round that adopted something tells more of the others.
             self.steps += [SelectionStep(tried, None)] if tried and (missing or not self.steps) else []
             return False
@@ -266,15 +254,15 @@ class _ForwardSelection:
     def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
         """Return the effect that is supported together with another, what else was tried, and what was refused."""
         evidence = self.weigh(lead.fitted.damper)
-        at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
+        at = refit(evidence.whole, lead.fitted.damper)
         seconds = self._candidates(evidence, at)
         best = next((c for c in seconds if self._reason_against(evidence, at, c) is None), None)
         if best is None:
             return None
         both = converged(evidence.whole, at, best)
-        if not closes_gap(self.evidence, self.config, self.current, both):
+        if not acceptance.closes_gap(self.evidence, self.config, self.current, both):
             return None
-        if spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
+        if acceptance.spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
             return None
         return both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds)
 
@@ -283,7 +271,7 @@ class _ForwardSelection:
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
             step = SelectionStep(finished, chosen.effect, rejected=refused)
-            self.steps.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
+            self.steps.append(replace(step, rivals=acceptance.rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
         self.choose_temperature_axis()
@@ -293,11 +281,9 @@ class _ForwardSelection:
     def _reweight(self, found: FitResult) -> None:
         """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap."""
         self.evidence = self.weigh(found.damper)
-        whole = self.evidence.whole
-        start = whole.start_with(found.damper)
-        self.current = fit(whole, found.effects, start)
-        if self._gap(self.current) > max(LARGEST_GAP_GROWTH * self._gap(found), self.config.negligible):
-            self.current = fit(whole, found.effects, start, evaluations=1)
+        self.current = refit(self.evidence.whole, found.damper)
+        if self._widens_gap(self.current, found):
+            self.current = refit(self.evidence.whole, found.damper, evaluations=1)
 
     def swap(self) -> None:
         """Repeat the step of each effect adopted before the last, and keep what does better."""
@@ -318,17 +304,16 @@ class _ForwardSelection:
     def reweight_until_stable(self) -> None:
         """Iterate fit and weights until no parameter moves, unless that widens the gap."""
         evidence, current = reweighted(self.weigh, self.evidence, self.current)
-        if self._gap(current) <= max(LARGEST_GAP_GROWTH * self._gap(self.current), self.config.negligible):
+        if not self._widens_gap(current, self.current):
             self.evidence, self.current = evidence, current
 
-    def _gap(self, fitted: FitResult) -> float:
-        return self.evidence.gap(fitted)
+    def _widens_gap(self, fitted: FitResult, before: FitResult) -> bool:
+        most = thresholds.LARGEST_GAP_GROWTH * self.evidence.gap(before)
+        return self.evidence.gap(fitted) > max(most, self.config.negligible)
 
     def _without(self, effect: str) -> FitResult:
         """Fit without one of the adopted effects."""
-        whole, damper = self.evidence.whole, self.current.damper
-        effects = {name: values for name, values in damper.effects.items() if name != effect}
-        return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
+        return refit(self.evidence.whole, self.current.damper.without_effects(effect))
 
     def competing_confounders(self) -> tuple[ConfounderMatch, ...]:
         """Return the confounders that would do as well as an adopted effect, in its place."""
@@ -351,16 +336,17 @@ class _ForwardSelection:
             lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
-                    self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
-        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_TEST_SCATTER, MAY_BE_CHANCE))
+                    self.reasons[each.effect] = self._refused(lenient, each) or acceptance.MAY_BE_CHANCE
+        undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE
+        return tuple(name for name, why in self.reasons.items() if why in undecided)
 
     def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
         """Say why a candidate is too little, or spurious; None where the data support it by itself."""
         evidence, before = self.evidence, before or self.current
         return (
-            insufficient_support(evidence, config, each)
+            acceptance.insufficient_support(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
-            or spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
+            or acceptance.spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
         )
 
     def _drop_needless(self, effect: str, newest: str) -> None:
