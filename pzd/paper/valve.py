@@ -129,7 +129,7 @@ def peak_force(valve: Valve, row: Expected) -> float:
     return _friction_in(valve, row) + flow
 
 
-def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Damper:
+def stand_damper(valve: Valve, setting: str) -> Damper:
     """Return the damper that the virtual stand tests: Bingham rows, and a flow curve that bends as the slot opens.
 
     A slot that the pressure opens gives less than proportional forces. Of the effects, `shear_thinning` has
@@ -141,7 +141,6 @@ def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Da
     ----------
     valve : its parameters
     setting : which gap
-    stiffness : of the oil spring [N/m]
     """
     tests = [row for row in rig_tests() if row.setting == setting]
     speed = max(peak_speed(row) for row in tests)
@@ -154,7 +153,7 @@ def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Da
             temperature_degC=t,
             T0_N=valve.friction_at(t),
             C_Ns_per_m=_coefficient(flow_force(valve, setting, u, t, speed), speed, n),
-            k_N_per_m=stiffness,
+            k_N_per_m=STIFFNESS,
         )
         for t in ([REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC])
         for u in voltages

@@ -12,7 +12,7 @@ import json
 import logging
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -151,7 +151,7 @@ class Run:
         """
         with locked(self.folder, command):
             with as_files_error(self.folder):
-                clean_up(self.folder, _FOLDERS, (CONFIG,))
+                clean_up(self.folder)
             yield
 
     def write_config(self, text: str) -> None:
@@ -314,20 +314,12 @@ def hidden(folder: Path, name: str, ending: str) -> Path:
     return folder / f".{name}{ending}"
 
 
-def clean_up(folder: Path, folders: Collection[str], files: Collection[str]) -> None:
-    """Settle what a killed command left; what only looks like it is reported and left.
-
-    Parameters
-    ----------
-    folder : the folder of the run
-    folders : names of the folders that are written there
-    files : names of the files that are written there
-    """
-    for name in files:
-        path = hidden(folder, name, NEW)
-        if path.is_file() and not path.is_symlink():
-            path.unlink()
-    for name in folders:
+def clean_up(folder: Path) -> None:
+    """Settle what a killed command left in the folder of a run; what only looks like it is reported and left."""
+    config = hidden(folder, CONFIG, NEW)
+    if config.is_file() and not config.is_symlink():
+        config.unlink()
+    for name in _FOLDERS:
         _settle(folder, name)
     for path in sorted(folder.glob(".*")):
         if path.suffix in (NEW, OLD):

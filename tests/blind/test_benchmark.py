@@ -35,9 +35,9 @@ from pzd.damper.compose import respond
 from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.parallel import chunks
+from pzd.parallel import chunks, engines
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.engines import Pools, Where, local
+from pzd.parallel.engines import Pools, Where
 from pzd.parallel.processes import spawned_pool
 from pzd.schema.errors import ConfigError, DataError
 
@@ -115,7 +115,7 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
         begun.append(count)
         return spawned_pool(count)
 
-    monkeypatch.setattr(local, "spawned_pool", counting_pool)
+    monkeypatch.setattr(engines, "spawned_pool", counting_pool)
     (case,) = benchmark_of(small("blind.cases=1"), tmp_path).run(jobs=2)
     assert begun == [1, 1]
     assert case.failure is None

@@ -277,8 +277,7 @@ def _average_cycle(test: PreflightRecord, cycles: Cycles) -> Section:
 
     def delayed(delays: Array) -> Array:
         turn = np.exp(2j * np.pi * np.outer(delays, harmonics) * cycles.frequency)
-        values: Array = np.fft.irfft(spectrum * turn, force.size, axis=1)[:, ::every]
-        return values
+        return np.asarray(np.fft.irfft(spectrum * turn, force.size, axis=1)[:, ::every])
 
     return Section(every * cycles.period / x.size, x[::every], delayed, periodic=True)
 
@@ -346,20 +345,17 @@ def forces_per_stiffness(section: Section, pairs: Sequence[tuple[float, float]])
 def _free_terms(x: Array) -> Array:
     """Orthonormal columns (n, 3) of offset, spring and inertia."""
     bend = np.gradient(np.gradient(x))
-    result: Array = np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0]
-    return result
+    return np.asarray(np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0])
 
 
 def _projected_out(forces: Array, free: Array) -> Array:
     """Rows (m, n) without their offset, spring and inertia."""
-    rest: Array = forces - (forces @ free) @ free.T
-    return rest
+    return np.asarray(forces - (forces @ free) @ free.T)
 
 
 def _normalised(rows: Array) -> Array:
     """Rows (m, n) of unit length."""
-    result: Array = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    return result
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300))
 
 
 CHECKS = (offset, delay)

@@ -531,9 +531,7 @@ def check_inertance(dynamic: DynamicDamper, car: HalfCar) -> None:
     ------
     DataError : when it would
     """
-    apart = min(
-        float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row)) for row in dynamic.parallel
-    )
+    apart = min(inertance(row) for row in dynamic.parallel)
     per_axle = apart * max(n * r * r for n, r in zip(car.dampers, car.motion_ratios, strict=True))
     mobility = np.max(np.linalg.eigvalsh(car.mobility()))
     if 1.0 + per_axle * mobility <= 0.0:
