@@ -78,14 +78,11 @@ class ChunkedWork(Generic[T, R]):
                         raise
                     except Exception:  # noqa: BLE001  # an error that does not reach us unharmed is the end of a process
                         lost.append(chunk)
+                        continue
+                    if step + 1 < len(self.steps):
+                        ready[step + 1].append(chunk)
                     else:
-                        self._hand_over(step, chunk, found, ready)
-
-    def _hand_over(self, step: int, chunk: tuple[T, ...], found: Any, ready: list[list[tuple[T, ...]]]) -> None:
-        if step + 1 < len(self.steps):
-            ready[step + 1].append(chunk)
-        else:
-            self.keep(chunk, found)
+                        self.keep(chunk, found)
 
     def _alone(self, chunk: tuple[T, ...]) -> None:
         """Do a chunk task by task, with nothing beside it, to find the task that kills its process."""
