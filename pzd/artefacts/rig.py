@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self, TypeVar
@@ -12,7 +12,7 @@ import numpy as np
 from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
-from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record, clock_fault
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
@@ -20,6 +20,8 @@ from pzd.schema.validate import read_json_list, write_json
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
+CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
+"""Columns of a record's file, named as the fields of `Record`; the first five are in every one."""
 
 
 class Finding(Frozen):
@@ -95,7 +97,10 @@ class Rig:
         """Write records.json and one CSV a record, so many at the same time; of files also ingest.json."""
 
         def written(record: Record) -> None:
-            write_columns(folder / f"{record.name}.csv", _channels(record), control)
+            columns = {q.column: getattr(record, q.name) for q in CHANNELS}
+            if record.pressure is None:
+                del columns[PRESSURE.column]
+            write_columns(folder / f"{record.name}.csv", columns, control)
 
         write_json(folder / "records.json", self.entries, control)
         if self.ingested:
@@ -115,19 +120,6 @@ class Rig:
         return cls(tuple(records), entries, read_json_list(report, IngestRow, control) if report.is_file() else ())
 
 
-def _channels(record: Record) -> Mapping[str, Array | None]:
-    columns: dict[str, Array | None] = {
-        TIME.column: record.time,
-        DISPLACEMENT.column: record.displacement,
-        VELOCITY.column: record.velocity,
-        ACCELERATION.column: record.acceleration,
-        FORCE.column: record.force,
-        VOLTAGE.column: record.voltage,
-        TEMPERATURE.column: record.temperature,
-    }
-    return columns if record.pressure is None else {**columns, PRESSURE.column: record.pressure}
-
-
 def _as_read(record: Record) -> Record:
     """Return the record itself where its channels are so already, since caches go by the identity of a record."""
     given: list[Any] = [getattr(record, field.name) for field in fields(record)]
@@ -137,18 +129,12 @@ def _as_read(record: Record) -> Record:
 
 def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
     """Read the file of an entry as it stands, also where it was edited; its clock must run forwards."""
-    optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
-    header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
     path = folder / f"{entry.name}.csv"
-    columns = read_columns(path, header, control, optional)
+    columns = read_columns(path, [q.column for q in CHANNELS], control, [q.column for q in CHANNELS[5:]])
     if fault := clock_fault(columns[TIME.column]):
         raise DataError(f"{at(path, fault[0] + 2)}: {fault[1]}")
-    return Record(
-        entry.name,
-        entry.setting,
-        *(columns[name] for name in header[:5]),
-        *(columns.get(name) for name in optional),
-    )
+    channels = {q.name: columns[q.column] for q in CHANNELS if q.column in columns}
+    return Record(entry.name, entry.setting, **channels)
 
 
 # --- Looking up the tests or conditions that a few stated numbers mean ---

@@ -112,7 +112,7 @@ class ChunkedWork(Generic[T, R]):
             except UserError:
                 raise
             except Exception as error:
-                raise _LostError(step, _why(error)) from error
+                raise _LostError(step, error) from error
         result: R = made[0]
         return result
 
@@ -121,14 +121,9 @@ class ChunkedWork(Generic[T, R]):
 
 
 class _LostError(Exception):
-    """A process was lost in a step."""
+    """A process was lost in a step, with the reason in the same words whatever the engine."""
 
-    def __init__(self, step: int, reason: str) -> None:
-        super().__init__(reason)
+    def __init__(self, step: int, error: Exception) -> None:
+        killed = isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
+        super().__init__("it was killed" if killed else f"{type(error).__name__}: {error}")
         self.step = step
-
-
-def _why(error: Exception) -> str:
-    """Return why a process was lost, in the same words whatever the engine."""
-    killed = isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
-    return "it was killed" if killed else f"{type(error).__name__}: {error}"

@@ -60,16 +60,16 @@ def looks(state: Callable[[], State], wait: Callable[[], None]) -> Iterator[Look
     wait : takes its time between two looks
     """
     handled: State | None = None
-    before, moved, told = state(), set[Path](), set[Path]()
+    before, moved, reported = state(), set[Path](), set[Path]()
     while True:
         wait()
         now = state()
         moving = {path for path in now if now[path] != before.get(path)}
-        going_on = (moving & moved) - told
+        going_on = (moving & moved) - reported
         settled = now == before and now != handled
         still = (f"{path}: still being written" for path in sorted(going_on))
         yield Look(tuple(_changes(handled or now, now) if settled else still), settled=settled)
-        before, moved, told = now, moving, (told | going_on) & moving
+        before, moved, reported = now, moving, (reported | going_on) & moving
         handled = now if settled else handled
 
 

@@ -245,7 +245,12 @@ class Run:
                 fill(fresh)
                 self._keep_edits(name, fresh)
                 sync_folder(fresh)
-                self._swap(target, fresh)
+                old = hidden(self.folder, name, OLD)
+                if target.exists():
+                    target.rename(old)
+                fresh.rename(target)
+                sync(self.folder)
+                shutil.rmtree(old, ignore_errors=True)
         finally:
             if made:
                 shutil.rmtree(fresh, ignore_errors=True)
@@ -274,14 +279,6 @@ class Run:
             shutil.copy2(target / file, fresh / file)
         for file in edited:
             _keep_edited(target / file, fresh / Path(file).parent)
-
-    def _swap(self, target: Path, fresh: Path) -> None:
-        old = hidden(self.folder, target.name, OLD)
-        if target.exists():
-            target.rename(old)
-        fresh.rename(target)
-        sync(self.folder)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 # --- Hand edits

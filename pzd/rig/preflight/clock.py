@@ -12,7 +12,7 @@ from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
 
 GAP = 1.5
-"""Steps of the clock, in median ones, above which samples are lost: half way to one lost sample."""
+"""Steps of the clock, in median ones, above which samples are lost: half of one lost sample more."""
 
 # --- Sampling ---
 

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from pzd.artefacts import (
-    AXLE_COLUMNS,
-    Ending,
-    FoundRow,
-    Response,
-    Ride,
-    RideRow,
-    Rides,
-    SpectrumRow,
-    WeightedRow,
-)
+from pzd.artefacts import AXLE_COLUMNS, Ending, FoundRow, Response, Ride, RideRow, Rides, SpectrumRow, WeightedRow
 from pzd.comfort.iso2631_1997 import evaluate, maximum_transient
 from pzd.comfort.spectrum import Components, harmonics, third_octaves
 from pzd.comfort.weighting import WK, weighted
@@ -43,6 +34,8 @@ from pzd.simulate.ride.outcome import (
 from pzd.simulate.ride.riding import CourseSink, FixedValues, SearchResult, clock_of
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.study.plan import Case
+
+log = logging.getLogger(__name__)
 
 # --- Weighted measures of a ride, and what its vibration is made of ---
 
@@ -125,10 +118,10 @@ class RideRows:
 
 
 class Gathering:
-    """Rides are judged as soon as their window is known, and then forgotten but for their histories.
+    """Evaluates the rides of a config, each as soon as its window is known; only its history and rows are kept.
 
-    On a road that goes on and on that is at once, and a long ride is judged piece by piece while it goes. Those over a
-    single event wait for each other, since they are judged over the same time.
+    On a road that goes on and on the window is known at once, and a long ride is evaluated piece by piece while it
+    goes. Rides over a single event wait for each other, since they are compared over the same time.
     """
 
     def __init__(self, config: SimulateConfig, with_voltage: bool) -> None:
@@ -145,6 +138,7 @@ class Gathering:
         case : the case
         ridden : rides it, see `Setup.ridden`
         """
+        log.info("simulate: %s", case.name)
         if event_of(case.road, self._config) is not None:
             return ridden(case, None)
         clock = clock_of(self._config)
