@@ -55,7 +55,7 @@ from pzd.artefacts.rides import (
     WeightedRow,
     WheelRow,
 )
-from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, entry_numbers
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report

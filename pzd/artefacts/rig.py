@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self, TypeVar
@@ -12,17 +12,16 @@ import numpy as np
 from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
-from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record, clock_fault
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 from pzd.schema.validate import read_json_list, write_json
-from pzd.schema.yamlfile import read_yaml
-from pzd.signals.cycles import Cycles, cycles_of
-from pzd.signals.measures import reversals, work
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
+CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
+"""Columns of a record's file, named as the fields of `Record`; the first five are in every one."""
 
 
 class Finding(Frozen):
@@ -98,7 +97,10 @@ class Rig:
         """Write records.json and one CSV a record, so many at the same time; of files also ingest.json."""
 
         def written(record: Record) -> None:
-            write_columns(folder / f"{record.name}.csv", _channels(record), control)
+            columns = {q.column: getattr(record, q.name) for q in CHANNELS}
+            if record.pressure is None:
+                del columns[PRESSURE.column]
+            write_columns(folder / f"{record.name}.csv", columns, control)
 
         write_json(folder / "records.json", self.entries, control)
         if self.ingested:
@@ -113,24 +115,9 @@ class Rig:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        records = parallel_map(
-            lambda number: _read_record(folder, number, entries[number], control), range(len(entries)), jobs
-        )
+        records = parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)
         report = folder / INGEST
         return cls(tuple(records), entries, read_json_list(report, IngestRow, control) if report.is_file() else ())
-
-
-def _channels(record: Record) -> Mapping[str, Array | None]:
-    columns: dict[str, Array | None] = {
-        TIME.column: record.time,
-        DISPLACEMENT.column: record.displacement,
-        VELOCITY.column: record.velocity,
-        ACCELERATION.column: record.acceleration,
-        FORCE.column: record.force,
-        VOLTAGE.column: record.voltage,
-        TEMPERATURE.column: record.temperature,
-    }
-    return columns if record.pressure is None else {**columns, PRESSURE.column: record.pressure}
 
 
 def _as_read(record: Record) -> Record:
@@ -140,87 +127,14 @@ def _as_read(record: Record) -> Record:
     return record if all(a is b for a, b in zip(given, read, strict=True)) else Record(*read)
 
 
-def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control) -> Record:
-    optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
-    header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
+def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
+    """Read the file of an entry as it stands, also where it was edited; its clock must run forwards."""
     path = folder / f"{entry.name}.csv"
-    columns = read_columns(path, header, control, optional)
+    columns = read_columns(path, [q.column for q in CHANNELS], control, [q.column for q in CHANNELS[5:]])
     if fault := clock_fault(columns[TIME.column]):
         raise DataError(f"{at(path, fault[0] + 2)}: {fault[1]}")
-    record = Record(
-        entry.name,
-        entry.setting,
-        *(columns[name] for name in header[:5]),
-        *(columns.get(name) for name in optional),
-    )
-    if faults := _edits(entry, record, control):
-        document = read_yaml(folder / "records.json", DataError)
-        raise DataError(
-            f"{document.place((str(number), control.renamed(name)))}: {fault}" for name, fault in faults.items()
-        )
-    return record
-
-
-def entry_numbers(record: Record, run: Cycles | None) -> dict[str, Any]:
-    """Return the numbers of a record that its entry in records.json holds, by which an edit of either is noticed.
-
-    Parameters
-    ----------
-    record : what the file holds
-    run : the cycles that repeat in it; a cycle of any other motion goes to either side
-    """
-    return {
-        "cycles": float(run.count) if run else 0.5 * len(reversals(record.displacement)),
-        "voltage_V": record.median_voltage(),
-        "temperature_degC": record.median_temperature(),
-        "rate_Hz": record.rate,
-        "displacement_rms_m": _rms(record.displacement),
-        "velocity_rms_m_per_s": _rms(record.velocity),
-        "acceleration_rms_m_per_s2": _rms(record.acceleration),
-        "force_rms_N": _rms(record.force),
-        "work_J": work(record.displacement, record.force),
-    }
-
-
-OTHER_UNIT = 3.0
-"""From this ratio of r.m.s. on a channel is in another unit: a pound-force is 4.4 newtons. Editing a sample, for
-instance to remove a spike, changes the r.m.s. by less."""
-_MEDIANS = ("voltage_V", "temperature_degC")
-_RMS = ("displacement_rms_m", "velocity_rms_m_per_s", "acceleration_rms_m_per_s2", "force_rms_N")
-_MAY_BE_LEFT_OUT = (*_RMS, "work_J")
-SAME_CYCLES = 1.0
-"""Editing a sample moves either end of a run of cycles by no more than part of a cycle."""
-
-
-def _rms(channel: Array) -> float:
-    return float(np.std(channel))
-
-
-def _edits(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
-    """Return a fault for each number of an entry that its file contradicts after an edit, by its key."""
-    faults: dict[str, str] = {}
-    for name, recorded in entry_numbers(record, cycles_of(record)).items():
-        listed = getattr(entry, name)
-        if (listed is None and (recorded is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, listed, recorded):
-            continue
-        must = "the median" if name in _MEDIANS else "that"
-        faults[name] = (
-            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {listed}, "
-            f"where {entry.name}.csv has {recorded}); one of them was edited: take that back, or change the other too"
-        )
-    return faults
-
-
-def _agree(name: str, listed: float | None, recorded: float | None) -> bool:
-    if listed is None or recorded is None:
-        return False
-    if name == "work_J":
-        return listed * recorded >= 0.0
-    if name == "cycles":
-        return abs(listed - recorded) <= SAME_CYCLES
-    if name in _RMS:
-        return max(abs(listed), abs(recorded)) <= OTHER_UNIT * min(abs(listed), abs(recorded))
-    return bool(np.isclose(listed, recorded, rtol=1e-3))
+    channels = {q.name: columns[q.column] for q in CHANNELS if q.column in columns}
+    return Record(entry.name, entry.setting, **channels)
 
 
 # --- Looking up the tests or conditions that a few stated numbers mean ---

@@ -95,15 +95,10 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
     the time, and its position on the chart
     """
     table = chart()
-    if not _covers(table, frequency):
+    if not table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME):
         return Exposure(None, f"not covered: {NOT_COVERED}", frequency)
     minutes, remark = _time(acceleration, FACTORS[boundary] * table.levels_at(frequency), table.minutes)
     return Exposure(minutes, remark, frequency)
-
-
-def _covers(table: Chart, frequency: float) -> bool:
-    """Return whether the chart has the frequency."""
-    return bool(table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME))
 
 
 def _time(acceleration: float, levels: Array, times: Array) -> tuple[float, str]:

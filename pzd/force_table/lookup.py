@@ -226,11 +226,6 @@ class Lookup:
         found[gap] = self.voltages[np.nanargmin(np.abs(nodes - F[gap]), axis=0)] if gap.any() else found[gap]
         return found
 
-    def inside(self, voltage: ArrayLike, velocity: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether a speed at a voltage lies in the operating envelope, linear between the voltages."""
-        limit = np.interp(np.asarray(voltage, dtype=np.float64), self.voltages, self.envelope)
-        return np.asarray(np.abs(velocity) <= limit * (1.0 + 1e-9))
-
 
 def _broadcast(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
     """Return two arrays of numbers in one shape."""

@@ -86,7 +86,11 @@ def between_settings(
 
     @cache
     def tested(name: str) -> TestedSetting:
-        return _tested(config, rig, identified, name)
+        damper = identified_damper(identified, name)
+        records = [record for record in rig.records if record.setting == name]
+        T, U = temperatures_of(damper), voltages_of(damper)
+        envelope = operating_envelope(records, T, U)
+        return TestedSetting(name, damper, T, U, envelope, grid(config, damper, T, envelope))
 
     wanted = config.between(names)
     rows = [row for number, one in enumerate(wanted) for row in _rows(config, number, one, tested, control)]
@@ -96,15 +100,6 @@ def between_settings(
     return tuple(rows), tuple(row for row in left_out if row)
 
 
-def _tested(config: TableConfig, rig: Rig, identified: Identified, name: str) -> TestedSetting:
-    """Return a tested setting."""
-    damper = identified_damper(identified, name)
-    records = [record for record in rig.records if record.setting == name]
-    temperatures, voltages = temperatures_of(damper), voltages_of(damper)
-    envelope = operating_envelope(records, temperatures, voltages)
-    return TestedSetting(name, damper, temperatures, voltages, envelope, grid(config, damper, temperatures, envelope))
-
-
 def _rows(
     config: TableConfig, number: int, one: Neighbours, tested: Callable[[str], TestedSetting], control: Control
 ) -> list[SettingRow]:
@@ -112,7 +107,10 @@ def _rows(
     lower, upper = tested(one.lower.setting), tested(one.upper.setting)
     found: list[SettingRow] = []
     for place in _common(config, (lower, upper)):
-        velocity = _velocities((lower, upper), place)
+        limit = min(lower.limit(place), upper.limit(place))
+        speeds = np.union1d(lower.nodes.speeds, upper.nodes.speeds)
+        speeds = np.append(speeds[speeds < limit * (1.0 - 1e-9)], limit)
+        velocity = np.concatenate([-speeds[::-1], speeds])  # with -0 and +0 in the middle
         force = _between(one.share, lower.forces(place, velocity), upper.forces(place, velocity))
         static = _between(one.share, lower.static_force(place), upper.static_force(place))
         found += [
@@ -209,11 +207,3 @@ def _clamped(value: float | None, known: Sequence[float | None]) -> float | None
     """Return a value clamped into the range of the known ones."""
     ends = [each for each in known if each is not None]
     return None if value is None or not ends else float(np.clip(value, min(ends), max(ends)))
-
-
-def _velocities(tested: Sequence[TestedSetting], place: Place) -> Array:
-    """Return the velocities [m/s] of the tables up to the tested speed of all, with -0 and +0 in the middle."""
-    limit = min(one.limit(place) for one in tested)
-    speeds = np.unique(np.concatenate([one.nodes.speeds for one in tested]))
-    within = np.append(speeds[speeds < limit * (1.0 - 1e-9)], limit)
-    return np.concatenate([-within[::-1], within])

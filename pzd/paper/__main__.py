@@ -8,22 +8,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 from pzd.damper.compiled.columns import value_of
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.paper.contradiction import (
-    BASES,
-    Attempt,
-    Base,
-    attempts,
-    claims,
-    excluded,
-    fitted_forces,
-    model_errors,
-)
+from pzd.paper.contradiction import BASES, Attempt, Base, attempts, claims, excluded, fitted_forces, model_errors
 from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, loop_in, rig_tests, span
 from pzd.paper.valve import STIFFNESS, Valve, calibrate, least_stiffness, stand_damper
 from pzd.report.reference import same_test
@@ -84,29 +73,18 @@ def _index(damper: Damper) -> float:
 # --- Contradiction ---
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """The effects that could close the gap between the published model and the published measurements."""
-
-    verdict: Literal["named", "ambiguous", "unexplained"]
-    closing: dict[Base, tuple[str, ...]]
-    """Over each base, the effects that meet all forces, best first; `no effect` where the base alone does."""
-    reason: str
-
-
-def verdict_on(tried: Sequence[Attempt]) -> Verdict:
-    """Return the verdict on the attempts: named only where one explanation is left.
+def verdict_on(tried: Sequence[Attempt]) -> tuple[str, str]:
+    """Return the verdict on the attempts, named only where one explanation is left, and its reason.
 
     Parameters
     ----------
     tried : every effect over every base
     """
-    closing = {base: tuple(one.effect for one in tried if one.base == base and one.closes) for base in BASES}
     explanations = [one for one in tried if one.closes]
     if not explanations:
-        return Verdict("unexplained", closing, "no effect meets the published forces, whatever the parameters")
+        return "unexplained", "no effect meets the published forces, whatever the parameters"
     if len(explanations) == 1:
-        return Verdict("named", closing, f"{explanations[0].effect} alone meets the published forces")
+        return "named", f"{explanations[0].effect} alone meets the published forces"
     unknowns = min(one.unknowns for one in explanations)
     forces = fitted_forces()
     numbers = sum(not any(same_test(row, earlier) for earlier in forces[:n]) for n, row in enumerate(forces))
@@ -114,7 +92,7 @@ def verdict_on(tried: Sequence[Attempt]) -> Verdict:
         f"{len(explanations)} of {len(tried)} attempts meet the forces, with {unknowns} unknowns or more for {numbers} "
         "numbers: none of them is put to a test, so no probability can be given to any"
     )
-    return Verdict("ambiguous", closing, reason)
+    return "ambiguous", reason
 
 
 def contradiction() -> Iterator[str]:
@@ -128,12 +106,12 @@ def contradiction() -> Iterator[str]:
     yield "An orifice would have to give the last column, rising as the slot closes: at gap 0.15 mm it falls, when hot"
     yield "it is negative. With Tables 2 and 3 the peak at 0 V rises with heat; the measured one falls."
     tried = attempts()
-    verdict = verdict_on(tried)
+    verdict, reason = verdict_on(tried)
     for base in BASES:
         yield f"\nGap 0.25 mm, 0 V, five forces; of the element is kept: {_BASE_IN_WORDS[base]}"
         yield from (_attempt_line(one) for one in tried if one.base == base)
     yield f"\nLeft out, for nothing that they need moves inside a published test: {', '.join(excluded())}"
-    yield f"Verdict: {verdict.verdict}: {verdict.reason}."
+    yield f"Verdict: {verdict}: {reason}."
 
 
 _BASE_IN_WORDS: dict[Base, str] = {

@@ -129,7 +129,7 @@ def peak_force(valve: Valve, row: Expected) -> float:
     return _friction_in(valve, row) + flow
 
 
-def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Damper:
+def stand_damper(valve: Valve, setting: str) -> Damper:
     """Return the damper that the virtual stand tests: Bingham rows, and a flow curve that bends as the slot opens.
 
     A slot that the pressure opens gives less than proportional forces. Of the effects, `shear_thinning` has
@@ -141,36 +141,26 @@ def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Da
     ----------
     valve : its parameters
     setting : which gap
-    stiffness : of the oil spring [N/m]
     """
     tests = [row for row in rig_tests() if row.setting == setting]
     speed = max(peak_speed(row) for row in tests)
     voltages = sorted({row.voltage_V or 0.0 for row in tests})
     hot = any(row.temperature_degC == HOT_DEGC for row in tests)
-    n = flow_index(valve, setting, 0.0, speed)
+    full, half = (flow_force(valve, setting, 0.0, REFERENCE_DEGC, share * speed) for share in (1.0, 0.5))
+    n = min(math.log2(full / half), 1.0)
     rows = tuple(
         BaseRow(
             voltage_V=u,
             temperature_degC=t,
             T0_N=valve.friction_at(t),
-            C_Ns_per_m=_coefficient(flow_force(valve, setting, u, t, speed), speed, n),
-            k_N_per_m=stiffness,
+            C_Ns_per_m=flow_force(valve, setting, u, t, speed)
+            / (REFERENCE_SPEED * math.pow(speed / REFERENCE_SPEED, n)),
+            k_N_per_m=STIFFNESS,
         )
         for t in ([REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC])
         for u in voltages
     )
     return Damper(base=rows).with_effect("shear_thinning", {"n": n})
-
-
-def flow_index(valve: Valve, setting: str, voltage: float, speed: float) -> float:
-    """Return the exponent n of the power law through the forces at a speed [m/s] and at half of it, 22 degC."""
-    full, half = (flow_force(valve, setting, voltage, REFERENCE_DEGC, share * speed) for share in (1.0, 0.5))
-    return min(math.log2(full / half), 1.0)
-
-
-def _coefficient(force: float, speed: float, index: float) -> float:
-    """Return C [N s/m] of the power law through one force [N] at one speed [m/s]."""
-    return force / (REFERENCE_SPEED * math.pow(speed / REFERENCE_SPEED, index))
 
 
 def least_stiffness() -> Mapping[str, float]:

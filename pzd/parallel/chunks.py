@@ -78,14 +78,11 @@ class ChunkedWork(Generic[T, R]):
                         raise
                     except Exception:  # noqa: BLE001  # an error that does not reach us unharmed is the end of a process
                         lost.append(chunk)
+                        continue
+                    if step + 1 < len(self.steps):
+                        ready[step + 1].append(chunk)
                     else:
-                        self._hand_over(step, chunk, found, ready)
-
-    def _hand_over(self, step: int, chunk: tuple[T, ...], found: Any, ready: list[list[tuple[T, ...]]]) -> None:
-        if step + 1 < len(self.steps):
-            ready[step + 1].append(chunk)
-        else:
-            self.keep(chunk, found)
+                        self.keep(chunk, found)
 
     def _alone(self, chunk: tuple[T, ...]) -> None:
         """Do a chunk task by task, with nothing beside it, to find the task that kills its process."""
@@ -115,7 +112,7 @@ class ChunkedWork(Generic[T, R]):
             except UserError:
                 raise
             except Exception as error:
-                raise _LostError(step, _why(error)) from error
+                raise _LostError(step, error) from error
         result: R = made[0]
         return result
 
@@ -124,14 +121,9 @@ class ChunkedWork(Generic[T, R]):
 
 
 class _LostError(Exception):
-    """A process was lost in a step."""
+    """A process was lost in a step, with the reason in the same words whatever the engine."""
 
-    def __init__(self, step: int, reason: str) -> None:
-        super().__init__(reason)
+    def __init__(self, step: int, error: Exception) -> None:
+        killed = isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
+        super().__init__("it was killed" if killed else f"{type(error).__name__}: {error}")
         self.step = step
-
-
-def _why(error: Exception) -> str:
-    """Return why a process was lost, in the same words whatever the engine."""
-    killed = isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
-    return "it was killed" if killed else f"{type(error).__name__}: {error}"

@@ -13,6 +13,7 @@ from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, check_settings, read_config, validated
 from pzd.identification.stage import refuse_one_condition, refuse_partly_recorded
 from pzd.parallel.processes import Listener, no_listener
+from pzd.pipeline.dependencies import leaves
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.quantities import Control
@@ -220,16 +221,8 @@ def resolved(given: Opened) -> tuple[Resolved, ...]:
     root = canonical_nodes(given.document.root, control)
     return tuple(
         Resolved(".".join(control.renamed(part) for part in path), value, _origin(root, path))
-        for path, value in _leaves(given.config.model_dump(mode="json"), ())
+        for path, value in leaves(given.config.model_dump(mode="json"))
     )
-
-
-def _leaves(data: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    below = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list | tuple) else ()
-    if not below:
-        yield path, data
-    for key, value in below:
-        yield from _leaves(value, (*path, str(key)))
 
 
 def _origin(root: Node, path: tuple[str, ...]) -> str:

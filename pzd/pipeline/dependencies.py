@@ -195,7 +195,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
         if is_artefact(annotation):
             found |= {f"{annotation.folder}/{file}": h for file, h in run.outputs(annotation.folder).items()}
         elif block := block_of(config, annotation):
-            values = dict(_leaves(block[0], block[1].model_dump(mode="json")))
+            values = _dotted(block[0], block[1].model_dump(mode="json"))
             found |= {path: _hash(value) for path, value in values.items()}
             if "folder" in stage.takes:
                 found |= _file_hashes(values, run.config.parent)
@@ -204,7 +204,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
         elif name == "seed":
             found[name] = _hash(config.seed)
     # Every stage's files name the control signal, so it counts whether the stage asks for it or not.
-    found |= {path: _hash(value) for path, value in _leaves("control", config.control.model_dump())}
+    found |= {path: _hash(value) for path, value in _dotted("control", config.control.model_dump()).items()}
     found |= {f"{name} version": _hash(versions()[name]) for name in _LIBRARIES}
     return found | {"marks": _hash(list(marks)), "code": code_hash(stage.function.__module__)}
 
@@ -232,13 +232,18 @@ def _hash(value: Any) -> str:
     return hashlib.sha256(json.dumps(value).encode()).hexdigest()
 
 
-def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Every single value of a block under its dotted path."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    if not inner:
+def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield every scalar, empty list and empty mapping of a config's data, each with its path of keys and indices."""
+    below = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    if not below:
         yield path, value
-    for key, below in inner:
-        yield from _leaves(f"{path}.{key}", below)
+    for key, inner in below:
+        yield from leaves(inner, (*path, str(key)))
+
+
+def _dotted(name: str, value: Any) -> dict[str, Any]:
+    """Return the leaves of a block by their dotted path."""
+    return {".".join(path): leaf for path, leaf in leaves(value, (name,))}
 
 
 def _file_hashes(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
@@ -258,8 +263,7 @@ def files_named(config: RunConfig, folder: Path) -> list[Path]:
     config : the config
     folder : its folder
     """
-    blocks = config.model_dump(mode="json")
-    return _files_named({path: leaf for name in blocks for path, leaf in _leaves(name, blocks[name])}, folder)
+    return _files_named({".".join(path): leaf for path, leaf in leaves(config.model_dump(mode="json"))}, folder)
 
 
 def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:

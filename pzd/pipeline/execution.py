@@ -60,15 +60,11 @@ class Pipeline:
         self._compiles = any(stage.function.__module__ == "pzd.simulate.stage" for stage in wanted)
         for number, stage in enumerate(wanted):
             self._execute_stage(stage, force=stage.name in forced)
-            if number == 0:
-                self._after_first(wanted)
+            if number == 0:  # the records are sound: see that it is clear which setting is meant
+                self.run.write_config(yaml_text(self.config, self.run.control))
+                if any("setting" in later.takes for later in wanted):
+                    self.setting()
         return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
-
-    def _after_first(self, wanted: Sequence[Stage]) -> None:
-        """Now that the records are sound, write the config, and see that it is clear which setting is meant."""
-        self.run.write_config(yaml_text(self.config, self.run.control))
-        if any("setting" in stage.takes for stage in wanted):
-            self.setting()
 
     def _execute_stage(self, stage: Stage, *, force: bool) -> None:
         inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))

@@ -144,8 +144,7 @@ def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
     """Add what the config says of the numbers: what is stale, and what the rides assume."""
     effects = found.diagnosis.effects if found.diagnosis else ()
     with_voltage = all(row.voltage_V is not None for row in found.parameters)
-    lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
     if not given.config.car:  # rides that an earlier config left in the folder are none of this run
         found = replace(found, summary=(), comfort=())
-        lines = ()
+    lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
     return replace(found, stale=stale_stages(given), assumed=lines)

@@ -67,16 +67,10 @@ def looks(state: Callable[[], State], wait: Callable[[], None]) -> Iterator[Look
         moving = {path for path in now if now[path] != before.get(path)}
         going_on = (moving & moved) - reported
         settled = now == before and now != handled
-        yield Look(
-            tuple(_changes(handled or now, now) if settled else _still(going_on)),
-            settled=settled,
-        )
+        still = (f"{path}: still being written" for path in sorted(going_on))
+        yield Look(tuple(_changes(handled or now, now) if settled else still), settled=settled)
         before, moved, reported = now, moving, (reported | going_on) & moving
         handled = now if settled else handled
-
-
-def _still(paths: Iterable[Path]) -> Iterator[str]:
-    return (f"{path}: still being written" for path in sorted(paths))
 
 
 def _changes(before: State, now: State) -> Iterator[str]:

@@ -215,17 +215,21 @@ def render(
     sections: tuple[Section, ...],
     footer: str = _FOOTER,
 ) -> str:
-    """Fill the template, which escapes every text."""
+    """Fill the template of the report."""
+    texts = {"title": title, "cards": headline, "assumed": assumed, "sections": sections, "footer": footer}
+    return filled("pzd.report", "report.html", texts)
+
+
+def filled(package: str, template: str, texts: Mapping[str, object]) -> str:
+    """Fill a template in the folder `templates` of a package, which escapes every text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("pzd.report", "templates"),
+        loader=PackageLoader(package, "templates"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template("report.html").render(
-        title=title, cards=headline, assumed=assumed, sections=sections, footer=footer
-    )
+    return environment.get_template(template).render(texts)

@@ -12,7 +12,7 @@ import json
 import logging
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -151,7 +151,7 @@ class Run:
         """
         with locked(self.folder, command):
             with as_files_error(self.folder):
-                clean_up(self.folder, _FOLDERS, (CONFIG,))
+                clean_up(self.folder)
             yield
 
     def write_config(self, text: str) -> None:
@@ -245,7 +245,12 @@ class Run:
                 fill(fresh)
                 self._keep_edits(name, fresh)
                 sync_folder(fresh)
-                self._swap(target, fresh)
+                old = hidden(self.folder, name, OLD)
+                if target.exists():
+                    target.rename(old)
+                fresh.rename(target)
+                sync(self.folder)
+                shutil.rmtree(old, ignore_errors=True)
         finally:
             if made:
                 shutil.rmtree(fresh, ignore_errors=True)
@@ -274,14 +279,6 @@ class Run:
             shutil.copy2(target / file, fresh / file)
         for file in edited:
             _keep_edited(target / file, fresh / Path(file).parent)
-
-    def _swap(self, target: Path, fresh: Path) -> None:
-        old = hidden(self.folder, target.name, OLD)
-        if target.exists():
-            target.rename(old)
-        fresh.rename(target)
-        sync(self.folder)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 # --- Hand edits
@@ -314,20 +311,12 @@ def hidden(folder: Path, name: str, ending: str) -> Path:
     return folder / f".{name}{ending}"
 
 
-def clean_up(folder: Path, folders: Collection[str], files: Collection[str]) -> None:
-    """Settle what a killed command left; what only looks like it is reported and left.
-
-    Parameters
-    ----------
-    folder : the folder of the run
-    folders : names of the folders that are written there
-    files : names of the files that are written there
-    """
-    for name in files:
-        path = hidden(folder, name, NEW)
-        if path.is_file() and not path.is_symlink():
-            path.unlink()
-    for name in folders:
+def clean_up(folder: Path) -> None:
+    """Settle what a killed command left in the folder of a run; what only looks like it is reported and left."""
+    config = hidden(folder, CONFIG, NEW)
+    if config.is_file() and not config.is_symlink():
+        config.unlink()
+    for name in _FOLDERS:
         _settle(folder, name)
     for path in sorted(folder.glob(".*")):
         if path.suffix in (NEW, OLD):

@@ -29,6 +29,18 @@ def classes() -> dict[str, float]:
         return {row["class"]: float(row["Gd_n0_geomean_m3"]) for row in csv.DictReader(file)}
 
 
+def known_class(name: str) -> str:
+    """Return the name of a road class.
+
+    Raises
+    ------
+    ValueError : when there is no such class
+    """
+    if name not in classes():
+        raise ValueError(f"a road class is one of {', '.join(classes())} (got {name})")
+    return name
+
+
 def height_density(wavenumber: Array, density: float, waviness: float = WAVINESS) -> Array:
     """Compute the one-sided spectral density of the height of a road.
 

@@ -45,7 +45,7 @@ class SensorNoise(Frozen):
 
 
 class Sensors(Frozen):
-    """What the controller sees of the ride: without a word all, exactly and at once."""
+    """What the controller measures of the ride; by default everything, exactly and without delay."""
 
     period_s: float | None = Field(default=None, gt=0.0)
     """A sample is taken this often, and held until the next. By default in every control period."""
@@ -58,7 +58,7 @@ class Sensors(Frozen):
 
 
 class Supply(Frozen):
-    """What becomes of the voltage that the controller asks for: without a word it is set, exactly and at once."""
+    """How the voltage that the controller asks for is set; by default exactly and without delay."""
 
     step: float | None = Field(default=None, gt=0.0)
     """Distance of the values that can be set, in the unit of the control signal."""
@@ -79,7 +79,8 @@ class Supply(Frozen):
 
 # --- `car`: one of the library, and whatever is to be different from it ---
 
-Pair = tuple[float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class CarBlock(Frozen):
@@ -97,20 +98,20 @@ class CarBlock(Frozen):
     """Distance from the centre of gravity to axle 1, which leads."""
     a2_m: float | None = Field(default=None, gt=0.0)
     """Distance from the centre of gravity to axle 2, which follows."""
-    spring_stiffness_N_per_m: Pair | None = None
+    spring_stiffness_N_per_m: tuple[Positive, Positive] | None = None
     """Spring stiffness k1, k2 at the axles."""
     x_K_m: float | None = None
     """Place of point K, where comfort is judged: from the centre of gravity, positive towards axle 2."""
-    motion_ratio: Pair | None = None
+    motion_ratio: tuple[Positive, Positive] | None = None
     """Extension of a damper over deflection of its suspension, per axle."""
-    dampers_per_axle: Pair | None = None
+    dampers_per_axle: tuple[Positive, Positive] | None = None
     """Number of dampers that act at each axle."""
-    unsprung_mass_kg: Pair | None = None
+    unsprung_mass_kg: tuple[Positive, Positive] | None = None
     """Mass m1, m2 of the wheels of each axle with what moves with them. Without it the wheels have none, and follow
     the road."""
-    tyre_stiffness_N_per_m: Pair | None = None
+    tyre_stiffness_N_per_m: tuple[Positive, Positive] | None = None
     """Stiffness of the tyres of each axle, all of them together."""
-    tyre_damping_Ns_per_m: Pair | None = None
+    tyre_damping_Ns_per_m: tuple[NotNegative, NotNegative] | None = None
     """Damping of the tyres of each axle; by default none."""
 
     @field_validator("model")
@@ -119,22 +120,6 @@ class CarBlock(Frozen):
         if name not in cars():
             raise ValueError(f"no car is called {name}; there are {', '.join(sorted(cars()))}")
         return name
-
-    @field_validator(
-        "spring_stiffness_N_per_m", "motion_ratio", "dampers_per_axle", "unsprung_mass_kg", "tyre_stiffness_N_per_m"
-    )
-    @classmethod
-    def _positive(cls, pair: Pair | None) -> Pair | None:
-        if pair is not None and min(pair) <= 0.0:
-            raise ValueError(f"both must be above zero (got {pair[0]:g}, {pair[1]:g})")
-        return pair
-
-    @field_validator("tyre_damping_Ns_per_m")
-    @classmethod
-    def _not_negative(cls, pair: Pair | None) -> Pair | None:
-        if pair is not None and min(pair) < 0.0:
-            raise ValueError(f"neither may be below zero (got {pair[0]:g}, {pair[1]:g})")
-        return pair
 
     @model_validator(mode="after")
     def _wheels_on_tyres(self) -> CarBlock:

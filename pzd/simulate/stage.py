@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,13 +12,7 @@ from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
-    from pzd.simulate.ride.outcome import Outcome
-    from pzd.simulate.ride.riding import FixedValues
     from pzd.simulate.roads import Profile
-    from pzd.simulate.study.gathering import RideRows
-    from pzd.simulate.study.plan import Case
-
-log = logging.getLogger(__name__)
 
 
 def simulate(
@@ -64,13 +57,8 @@ def simulate(
         setups[plain] = Setup(simulate, profiles, grid, dynamic, table.notes.outside == "error")
 
     gathering = Gathering(simulate, with_voltage)
-
-    def ridden(case: Case) -> RideRows | tuple[FixedValues, Outcome]:
-        log.info("simulate: %s", case.name)
-        return gathering.of_ride(case, setups[case.plain].ridden)
-
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        rides = list(pool.map(ridden, planned))
+        rides = list(pool.map(lambda case: gathering.of_ride(case, setups[case.plain].ridden), planned))
     answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
     return gathering.all(planned, rides, answered)
 

@@ -255,9 +255,10 @@ def test_page_and_terminal_name_the_tested_neighbours_and_the_prediction_error(
     assert status(["run", *arguments]) == 0
     assert status(["show", *arguments]) == 0
     told = capsys.readouterr().out
-    assert "interpolated and not tested" in told
+    assert "settings that were not tested: interpolated force" in told
     assert "click 2 and click 6" in told
-    assert "click 6  between click 2 and click 8  missed by" in told
+    assert "tested settings predicted from their neighbours" in told
+    assert "click 2 and click 8" in told
     page = (tmp_path / "runs" / "my" / "6-report" / "report.html").read_text(encoding="utf-8")
     assert "were not tested" in page
     assert "Tested settings predicted from their neighbours" in page

@@ -31,11 +31,13 @@ from pzd.artefacts import (
     RideRow,
     Rides,
     Rig,
+    SpectrumRow,
     StepRow,
     SummaryRow,
     Table,
     TableNotes,
     Value,
+    WeightedRow,
     WheelRow,
 )
 from pzd.damper.compose import respond, steady_force
@@ -49,7 +51,7 @@ from pzd.report.ride_comfort import RatedRide, rated
 from pzd.report.stage import report
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.outcome import settled
-from pzd.simulate.study.gathering import Vibration, vibration
+from pzd.simulate.study.gathering import spectrum_rows, weighted_row
 
 BASELINE = Damper(
     base=(
@@ -258,7 +260,8 @@ class Made:
     row: SummaryRow
     ridden: RideRow
     wheels: tuple[WheelRow, ...]
-    vibration: Vibration
+    weighted: WeightedRow
+    spectrum: tuple[SpectrumRow, ...]
 
     def rated(self) -> RatedRide:
         """As the report rates it."""
@@ -313,8 +316,10 @@ def made(
         )
         for axle in (1, 2)
     )
-    measured = vibration(case, "K", a, 1.0 / RATE_HZ, settled(settle, 1.0 / RATE_HZ, a.size - 1), fundamental)
-    return Made(Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row, ridden, wheels, measured)
+    window = settled(settle, 1.0 / RATE_HZ, a.size - 1)
+    measured = weighted_row(case, a, RATE_HZ, window)
+    spectrum = spectrum_rows(case, a[window.steps], RATE_HZ, fundamental)
+    return Made(Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row, ridden, wheels, measured, spectrum)
 
 
 def rides_of(made: Sequence[Made], responses: tuple[Response, ...] = ()) -> Rides:
@@ -324,8 +329,8 @@ def rides_of(made: Sequence[Made], responses: tuple[Response, ...] = ()) -> Ride
         tuple(one.row for one in made),
         tuple(one.ridden for one in made),
         tuple(wheel for one in made for wheel in one.wheels),
-        tuple(one.vibration.weighted for one in made),
-        tuple(line for one in made for line in one.vibration.spectrum),
+        tuple(one.weighted for one in made),
+        tuple(line for one in made for line in one.spectrum),
         responses,
     )
 

@@ -250,8 +250,8 @@ def test_a_groundhook_asks_for_a_damper_between_wheel_and_ground(ride) -> None:
         ({"car": {"unsprung_mass_kg": [90, 80]}}, "give tyre_stiffness_N_per_m as well"),
         ({"car": {"tyre_stiffness_N_per_m": [4e5, 4e5]}}, "give unsprung_mass_kg as well"),
         ({"car": {"tyre_damping_Ns_per_m": [100, 100]}}, "wheels without mass have no tyres"),
-        ({"car": {**WHEELS, "tyre_damping_Ns_per_m": [-1, 100]}}, r"neither may be below zero \(got -1, 100\)"),
-        ({"car": {**WHEELS, "unsprung_mass_kg": [0, 80]}}, r"both must be above zero \(got 0, 80\)"),
+        ({"car": {**WHEELS, "tyre_damping_Ns_per_m": [-1, 100]}}, "greater than or equal to 0"),
+        ({"car": {**WHEELS, "unsprung_mass_kg": [0, 80]}}, "greater than 0"),
     ],
 )
 def test_what_does_not_fit_is_refused(given, says) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from pzd.paper.figures.canvas import PAPER_STYLE, encoded
 from pzd.paper.figures.numbered import PaperFigure, library
 from pzd.paper.figures.sources import FigureData
 from pzd.quantities import Control
+from pzd.report.page import filled
 from pzd.schema.model import Frozen
 from pzd.schema.validate import write_json
 
@@ -62,22 +63,8 @@ class FigureSet:
         for name, content in self.files.items():
             (folder / name).write_bytes(content)
         write_json(folder / "manifest.json", self.entries, Control())
-        (folder / "index.html").write_text(_page(self.entries), encoding="utf-8", newline="\n")
-
-
-def _page(entries: Sequence[FigureEntry]) -> str:
-    """Return index.html: every figure with its sources, relative links, no script; the template escapes every text."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("pzd.paper.figures", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("index.html").render(entries=entries)
+        page = filled("pzd.paper.figures", "index.html", {"entries": self.entries})
+        (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
 
 
 def drawn(data: FigureData, say: Callable[[str], None] = lambda _: None) -> FigureSet:

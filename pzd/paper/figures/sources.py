@@ -15,7 +15,6 @@ from pzd.force_table.config import TableConfig
 from pzd.paper.published import Loop
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.report.reference import Expected
 from pzd.runs import Run
 from pzd.simulate.config import SimulateConfig
 
@@ -34,12 +33,7 @@ class SettingRides:
 
 
 def rides_on(
-    damper: Damper,
-    setting: str | None,
-    rig: Rig,
-    simulate: SimulateConfig,
-    table: TableConfig,
-    control: Control,
+    damper: Damper, setting: str | None, rig: Rig, simulate: SimulateConfig, table: TableConfig, control: Control
 ) -> SettingRides:
     """Ride the run's car and roads on the baseline damper of one setting of the valve.
 
@@ -137,15 +131,6 @@ class FigureData:
         if not found:
             raise LookupError(f"the rig has no test at {conditions}")
         return RigTest(next(record for record in self.rig.records if record.name == found[0].record), found[0])
-
-    def test_of(self, row: Expected) -> RigTest:
-        """Return the test in which a published number was measured.
-
-        Raises
-        ------
-        LookupError : when the rig has none
-        """
-        return self.test(row.conditions)
 
     def row(self, conditions: Conditions) -> ParameterRow:
         """Return the identified parameters of a condition of the damper.

@@ -16,13 +16,14 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, entry_numbers
+from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
 from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics
+from pzd.signals.measures import reversals, work
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +114,24 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
         make: Callable[[], PreflightRecord],
     ) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
         test = make()
+        record, run = test.record, test.cycles
         entry = RecordEntry(
-            name=test.record.name,
-            setting=test.record.setting,
+            name=record.name,
+            setting=record.setting,
+            voltage_V=record.median_voltage(),
+            temperature_degC=record.median_temperature(),
+            rate_Hz=record.rate,
+            # A cycle of a motion that does not repeat goes to either side.
+            cycles=float(run.count) if run else 0.5 * len(reversals(record.displacement)),
+            displacement_rms_m=float(np.std(record.displacement)),
+            velocity_rms_m_per_s=float(np.std(record.velocity)),
+            acceleration_rms_m_per_s2=float(np.std(record.acceleration)),
+            force_rms_N=float(np.std(record.force)),
+            work_J=work(record.displacement, record.force),
             findings=findings(test) if preflight else (),
             removed=test.removed,
-            **entry_numbers(test.record, test.cycles),
         )
-        return test.record, test.cycles, entry, test.ingested
+        return record, run, entry, test.ingested
 
     results = parallel_map(examine, tests, jobs)
     # Records were made in other processes, whose memory of the cycles is lost here.

@@ -12,7 +12,7 @@ from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
 
 GAP = 1.5
-"""Steps of the clock, in median ones, above which samples are lost: half way to one lost sample."""
+"""Steps of the clock, in median ones, above which samples are lost: half of one lost sample more."""
 
 # --- Sampling ---
 
@@ -121,8 +121,7 @@ def _runs_of_equal_samples(values: Array) -> tuple[Rows, Rows]:
 def _held_then_jumping(values: Array, least: float) -> Rows:
     """Last rows of runs of equal samples that end in a jump."""
     ends, lengths = _runs_of_equal_samples(values)
-    jumping: Rows = ends[(lengths >= LEAST_HELD) & (np.abs(values[ends + 1] - values[ends]) > least)]
-    return jumping
+    return np.asarray(ends[(lengths >= LEAST_HELD) & (np.abs(values[ends + 1] - values[ends]) > least)])
 
 
 def _oddly_long_runs(values: Array) -> Rows:
@@ -132,8 +131,7 @@ def _oddly_long_runs(values: Array) -> Rows:
     extreme = (values[ends] == values.max()) | (values[ends] == values.min())
     odd = (lengths >= LONG_HELD) & (lengths >= JUMP * usual) & ~extreme
     quiet = float(np.sum(lengths[~odd] - 1)) > QUIET * values.size
-    long: Rows = ends[:0] if quiet else ends[odd]
-    return long
+    return np.asarray(ends[:0] if quiet else ends[odd])
 
 
 def _isolated_jumps(values: Array, least: float) -> Rows:

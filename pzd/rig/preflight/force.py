@@ -238,16 +238,9 @@ class ReferenceFit:
         return self.residual_without_element > LEAST_RESIDUAL and self.residual < 0.5 * self.residual_without_element
 
 
-@dataclass(frozen=True, eq=False)
-class _Grid:
-    """Elements of many T0 / k and C / k."""
-
-    pairs: Sequence[tuple[float, float]]
-    """(g,) T0 / k [m] and C / k [s]."""
-    steps: tuple[float, float]
-    """From one to the next, in logarithms."""
-    forces: Array
-    """(g, n) without offset, spring and inertia, of unit length."""
+_Grid = tuple[Sequence[tuple[float, float]], tuple[float, float], Array]
+"""Elements of many T0 / k [m] and C / k [s]: the (g,) pairs, the steps from one to the next in logarithms, and the
+forces (g, n) without offset, spring and inertia, of unit length."""
 
 
 @lru_cache(maxsize=1)
@@ -277,8 +270,7 @@ def _average_cycle(test: PreflightRecord, cycles: Cycles) -> Section:
 
     def delayed(delays: Array) -> Array:
         turn = np.exp(2j * np.pi * np.outer(delays, harmonics) * cycles.frequency)
-        values: Array = np.fft.irfft(spectrum * turn, force.size, axis=1)[:, ::every]
-        return values
+        return np.asarray(np.fft.irfft(spectrum * turn, force.size, axis=1)[:, ::every])
 
     return Section(every * cycles.period / x.size, x[::every], delayed, periodic=True)
 
@@ -297,19 +289,19 @@ def fit_element(section: Section, forces: Array) -> ReferenceFit:
     centred = forces - forces.mean(axis=1, keepdims=True)
     unexplained: Array = np.sum(rest**2, axis=1) / np.maximum(np.sum(centred**2, axis=1), 1e-300)
 
-    def closest(grid: _Grid) -> tuple[int, int, float]:
+    def closest(elements: Array) -> tuple[int, int, float]:
         """Return the indices of the best element and force, and the share of the squares that is left."""
-        left = unexplained * (1.0 - np.maximum(grid.forces @ targets.T, 0.0) ** 2)
+        left = unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
         element, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
         return element, force, float(left[element, force])
 
-    grid = _first_grid(section)
-    element, force, left = closest(grid)
+    pairs, steps, elements = _first_grid(section)
+    element, force, left = closest(elements)
     for _ in range(_ZOOMS):
-        centre = zip(grid.pairs[element], grid.steps, strict=True)
-        grid = _grid(section, [(np.log(value) - step, np.log(value) + step) for value, step in centre], _ZOOM)
-        element, force, left = closest(grid)
-    return ReferenceFit(left, float(unexplained[force]), force, *grid.pairs[element])
+        spans = [(np.log(v) - step, np.log(v) + step) for v, step in zip(pairs[element], steps, strict=True)]
+        pairs, steps, elements = _grid(section, spans, _ZOOM)
+        element, force, left = closest(elements)
+    return ReferenceFit(left, float(unexplained[force]), force, *pairs[element])
 
 
 @lru_cache(maxsize=1)
@@ -326,7 +318,7 @@ def _grid(section: Section, spans: Sequence[tuple[float, float]], counts: tuple[
     frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
     pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
     forces = _projected_out(forces_per_stiffness(section, pairs), _free_terms(section.displacement))
-    return _Grid(pairs, (float(frictions[1] - frictions[0]), float(lags[1] - lags[0])), _normalised(forces))
+    return pairs, (float(frictions[1] - frictions[0]), float(lags[1] - lags[0])), _normalised(forces)
 
 
 def forces_per_stiffness(section: Section, pairs: Sequence[tuple[float, float]]) -> Array:
@@ -346,20 +338,17 @@ def forces_per_stiffness(section: Section, pairs: Sequence[tuple[float, float]])
 def _free_terms(x: Array) -> Array:
     """Orthonormal columns (n, 3) of offset, spring and inertia."""
     bend = np.gradient(np.gradient(x))
-    result: Array = np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0]
-    return result
+    return np.asarray(np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0])
 
 
 def _projected_out(forces: Array, free: Array) -> Array:
     """Rows (m, n) without their offset, spring and inertia."""
-    rest: Array = forces - (forces @ free) @ free.T
-    return rest
+    return np.asarray(forces - (forces @ free) @ free.T)
 
 
 def _normalised(rows: Array) -> Array:
     """Rows (m, n) of unit length."""
-    result: Array = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    return result
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300))
 
 
 CHECKS = (offset, delay)

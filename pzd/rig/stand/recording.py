@@ -179,11 +179,7 @@ class StandRecord:
 
 
 def run_campaign(
-    entry: VirtualEntry,
-    seed: int,
-    folder: Path = Path(),
-    control: Control | None = None,
-    law: ForceLaw = force_in_frame,
+    entry: VirtualEntry, seed: int, control: Control | None = None, law: ForceLaw = force_in_frame
 ) -> Iterator[StandRecord]:
     """Record every test of a campaign, one after the other.
 
@@ -191,16 +187,10 @@ def run_campaign(
     ----------
     entry : the stand
     seed : of every draw; the draws of a record depend on the seed and its own name alone
-    folder : of the config, for motions that are read
     control : the control signal, whose unit stands in the names
     law : computes the force; another law puts another damper into the stand
-
-    Raises
-    ------
-    ConfigError : when the file of a motion is missing
-    DataError : when the file of a motion cannot be read
     """
-    return map(recorder(entry, seed, folder, law), entry.plan(control))
+    return map(recorder(entry, seed, law=law), entry.plan(control))
 
 
 def recorder(
@@ -210,7 +200,9 @@ def recorder(
 
     Parameters
     ----------
-    entry, seed, folder, law : as for `run_campaign`
+    entry, seed, law : as for `run_campaign`
+    folder : of the config, for motions that are read; the record raises ConfigError where the file of one is missing,
+        and DataError where it cannot be read
     """
     last: _Drive | None = None
 

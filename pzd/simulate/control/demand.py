@@ -22,50 +22,33 @@ from pzd.simulate.ride.model import (
     Vehicle,
 )
 
-# --- The box Omega(V) of admissible forces, equation (11) of the paper, by either of its two bounds ---
+# --- The box Omega(V) of admissible forces ---
 
 
-@inlined
-def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[float, float]:
-    """Return the lowest and the highest force between two damping coefficients.
-
-    Equation: T_i in [c_min V_i, c_max V_i]      Source: Makowski and Knap 2021, eq. (11) and section 5
-
-    Parameters
-    ----------
-    velocity : suspension speed V_i [m/s]
-    c_min, c_max : smallest and largest damping coefficient of the axle [N s/m]
-
-    Returns
-    -------
-    lowest and highest force of the axle [N]
-    """
-    if velocity >= 0.0:
-        return c_min * velocity, c_max * velocity
-    return c_max * velocity, c_min * velocity
-
-
-@inlined
-def table_bounds(
-    velocity: float, motion_ratio: float, dampers: float, speeds: Array, rebound: Array, compression: Array
+@compiled
+def bounds_of(
+    control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
 ) -> tuple[float, float]:
-    """Return the lowest and the highest force of the table between its lowest and highest voltage.
+    """Return the lowest and the highest force of an axle [N].
 
-    Equation: T_i in {n r F(U, r V_i): U_min <= U <= U_max}      Source: Makowski and Knap 2021, eq. (11)
+    Equation: T_i in [c_min V_i, c_max V_i], or T_i in {n r F(U, r V_i): U_min <= U <= U_max} by the table, r the motion
+    ratio and n the number of dampers      Source: Makowski and Knap 2021, eq. (11) and section 5
 
     Parameters
     ----------
+    control_spec : by which of its bounds, if any
+    car, grid : the half-car and the table
+    axle : i, 0 or 1
     velocity : suspension speed V_i; the sign bit of 0 picks the side [m/s]
-    motion_ratio : r, damper extension over suspension deflection
-    dampers : n, number of dampers at the axle
-    speeds, rebound, compression : the table, see `pzd.force_table.lookup.table_force`
-
-    Returns
-    -------
-    lowest and highest force of the axle [N]
     """
-    low, high = table_range(speeds, rebound, compression, motion_ratio * velocity)
-    return dampers * motion_ratio * low, dampers * motion_ratio * high
+    if control_spec.bounds == BY_COEFFICIENTS:
+        one, other = control_spec.c_min * velocity, control_spec.c_max * velocity
+        return (one, other) if velocity >= 0.0 else (other, one)
+    if control_spec.bounds == BY_TABLE:
+        ratio, dampers = car.ratio[axle], car.dampers[axle]
+        low, high = table_range(grid.speeds, grid.rebound, grid.compression, ratio * velocity)
+        return dampers * ratio * low, dampers * ratio * high
+    return -math.inf, math.inf
 
 
 # --- Laws that switch each damper between its hardest and its softest state ---
@@ -213,18 +196,6 @@ def _segment(a0: float, D: Pair, low: Array, high: Array) -> tuple[int, float, f
 def one_sided(velocity: float, side: float) -> float:
     """Hold a velocity on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
     return math.copysign(max(side * velocity, 0.0), side)
-
-
-@compiled
-def bounds_of(
-    control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
-) -> tuple[float, float]:
-    """Return the lowest and the highest force of an axle [N] at a suspension speed [m/s]."""
-    if control_spec.bounds == BY_COEFFICIENTS:
-        return coefficient_bounds(velocity, control_spec.c_min, control_spec.c_max)
-    if control_spec.bounds == BY_TABLE:
-        return table_bounds(velocity, car.ratio[axle], car.dampers[axle], grid.speeds, grid.rebound, grid.compression)
-    return -math.inf, math.inf
 
 
 @inlined

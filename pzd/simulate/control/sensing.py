@@ -18,7 +18,7 @@ CHANNELS = SENSED + 1
 _DEFLECTION, _RATE, _BODY, _ACCELERATION = 0, 2, 4, 8
 """Where each begins: deflection and its rate have a channel an axle; the body has z, phi, dz, dphi, as in the state."""
 _LEAST_GAIN = 0.02
-"""What a rise between two samples misses of the road is forgotten after some fifty of them."""
+"""Least gain of the filter of the road's height: an error of the measured rise is forgotten after fifty samples."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
 HEIGHT_ERROR, RISE_ERROR = range(2)

@@ -15,9 +15,9 @@ The plant has the state of the oil, the lag of the valve, the adopted effects an
 (`plant` of `pzd.simulate.control.prediction`). Body, wheels, oil, acceleration and the road under each axle are sensed
 exactly, or as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its
 rise by a steady Kalman filter (`forecast`, in the same folder). The road ahead is known, or forecast from what has
-passed under the front axle (`forecast`); the rear axle meets it (a1 + a2) / speed later. What the forecasts missed of
-late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage held on by
-`margin`, times the share of the road's motion that was not foreseen.
+passed under the front axle (`forecast`); the rear axle meets it (a1 + a2) / speed later. Recent forecast errors may
+recur: the ride is tried with them added and subtracted, and a choice must beat the best voltage held on by `margin`,
+times the share of the road's motion that the forecasts did not predict.
 
 Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
 section 6.4; cost and road are ours.

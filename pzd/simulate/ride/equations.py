@@ -55,12 +55,6 @@ def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: floa
 
 
 @inlined
-def holding_share(car: Vehicle, axle: int) -> float:
-    """Return how much the holding force of an axle changes with the other axle's force: dT_i/dT_j."""
-    return -car.mobility[2] / car.mobility[axle]
-
-
-@inlined
 def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     """Fill dV/dt of both axles, and complete the damper forces by inertia and by what holds a sticking axle.
 
@@ -158,7 +152,8 @@ def _force_outside_sticking(y: Array, ride: RunningRide) -> None:
             car, stuck, workspace[Axle.SPRINGS, stuck], workspace[Axle.LIFT, stuck], workspace[Axle.SPRINGS, free]
         )
         a0 = spring_acceleration(car, workspace[Axle.DEFLECTION]) + car.comfort[stuck] * alone
-        slope = car.comfort[free] + car.comfort[stuck] * holding_share(car, stuck)
+        share = -car.mobility[2] / car.mobility[stuck]  # dT_i/dT_j of `holding_force`
+        slope = car.comfort[free] + car.comfort[stuck] * share
         wanted = -a0 / slope if slope != 0.0 else 0.0
         workspace[Axle.FORCE, free] = min(max(wanted, workspace[Axle.LOW, free]), workspace[Axle.HIGH, free])
     else:

@@ -75,7 +75,10 @@ def ride_exactly(
     w = 2.0 * np.pi * (road.wavenumber * vehicle_speed / (2.0 * np.pi))
     u, v, rise = _suspension_rows(car, w, road.amplitude, vehicle_speed)
     load = np.array(car.stiffnesses)[:, None] * u + damping * v
-    A = _system(car, w, load)
+    A = np.zeros((6, 6))
+    A[0, 2] = A[1, 3] = 1.0
+    A[2:4] = car.acceleration(load)
+    A[4, 5], A[5, 4] = w, -w
     x = _states(A, step, steps)
     deflection, rate, forces = x @ u.T, x @ v.T, x @ load.T
     comfort = forces @ car.force_to_comfort()
@@ -83,7 +86,9 @@ def ride_exactly(
     lost = _integral(A, damping * v.T @ v, step, x)
     energy[State.DISSIPATED] = lost[-1]
     energy[State.ROAD_WORK] = _integral(A, -0.5 * (load.T @ rise + rise.T @ load), step, x)[-1]
-    stored = _stored(car, u)
+    stored = 0.5 * u.T @ np.diag(car.stiffnesses) @ u  # energy of springs and body as a quadratic form of x
+    stored[2, 2] += 0.5 * car.mass
+    stored[3, 3] += 0.5 * car.pitch_inertia
     change = float(x[-1] @ stored @ x[-1] - x[0] @ stored @ x[0])
     too_fast = np.abs(rate) * np.array(car.motion_ratios) > reach * (1.0 + 1e-9)
     springs = deflection * np.array(car.stiffnesses)
@@ -112,14 +117,6 @@ def _suspension_rows(car: HalfCar, w: float, amplitude: float, speed: float) -> 
     return np.hstack([H.T, none, -height]), np.hstack([none, H.T, -moving]), np.hstack([none, none, moving])
 
 
-def _system(car: HalfCar, w: float, load: Array) -> Array:
-    A = np.zeros((6, 6))
-    A[0, 2] = A[1, 3] = 1.0
-    A[2:4] = car.acceleration(load)
-    A[4, 5], A[5, 4] = w, -w
-    return A
-
-
 def _states(A: Array, step: float, steps: int) -> Array:
     """Return the (steps + 1, 6) states from rest, doubled block by block."""
     from scipy.linalg import expm
@@ -146,10 +143,3 @@ def _integral(A: Array, Q: Array, step: float, x: Array) -> Array:
     whole = expm(block * step)
     gramian = whole[n:, n:].T @ whole[:n, n:]
     return np.concatenate([[0.0], np.cumsum(np.sum((x[:-1] @ gramian) * x[:-1], axis=1))])
-
-
-def _stored(car: HalfCar, u: Array) -> Array:
-    E: Array = 0.5 * u.T @ np.diag(car.stiffnesses) @ u
-    E[2, 2] += 0.5 * car.mass
-    E[3, 3] += 0.5 * car.pitch_inertia
-    return E

@@ -29,6 +29,7 @@ from pzd.damper.regimes import spring_force
 from pzd.force_table.lookup import Lookup, bracket
 from pzd.record import Array
 from pzd.schema.errors import DataError
+from pzd.simulate.policies import Aim
 from pzd.simulate.roads import Profile
 from pzd.simulate.vehicle.car import HalfCar
 
@@ -148,10 +149,20 @@ class Command(IntEnum):
 
 
 IDEAL, TABLE, DYNAMIC = range(3)
+FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
 """How a demanded force comes about."""
 UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
 """What bounds a demanded force."""
 FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT, SCHEDULE = range(6)
+AIMS: dict[Aim, int] = {
+    "damping": FEEDBACK,
+    "feedback": FEEDBACK,
+    "switch": SWITCH,
+    "minimise": MINIMISE,
+    "voltage": VOLTAGE,
+    "predict": PREDICT,
+    "schedule": SCHEDULE,
+}
 """What the policy asks for."""
 
 
@@ -531,9 +542,7 @@ def check_inertance(dynamic: DynamicDamper, car: HalfCar) -> None:
     ------
     DataError : when it would
     """
-    apart = min(
-        float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row)) for row in dynamic.parallel
-    )
+    apart = min(inertance(row) for row in dynamic.parallel)
     per_axle = apart * max(n * r * r for n, r in zip(car.dampers, car.motion_ratios, strict=True))
     mobility = np.max(np.linalg.eigvalsh(car.mobility()))
     if 1.0 + per_axle * mobility <= 0.0:

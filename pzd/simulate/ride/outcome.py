@@ -205,14 +205,6 @@ class SpilledColumns(Mapping[str, Array]):
         return len(self._numbers)
 
 
-def columns_of(history: Array | SpilledRows, names: Sequence[str], left_out: set[str]) -> Mapping[str, Array]:
-    """Return the columns of a history by their names, but for those left out."""
-    numbers = {name: n for n, name in enumerate(names) if name not in left_out}
-    if isinstance(history, SpilledRows):
-        return SpilledColumns(history, numbers)
-    return {name: np.ascontiguousarray(history[:, n]) for name, n in numbers.items()}
-
-
 # --- The numbers of a ride in its window ---
 
 
@@ -299,7 +291,10 @@ def history_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
     """Return the history as the artefact holds it, without the columns that mean nothing in this ride."""
     names = RIDE_COLUMNS + tuple(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS)
     left_out = {name.format(axle) for name in without for axle in AXLES}
-    return Ride(case, columns_of(outcome.history, names, left_out))
+    numbers, history = {name: n for n, name in enumerate(names) if name not in left_out}, outcome.history
+    if isinstance(history, SpilledRows):
+        return Ride(case, SpilledColumns(history, numbers))
+    return Ride(case, {name: np.ascontiguousarray(history[:, n]) for name, n in numbers.items()})
 
 
 # --- A long ride, judged piece by piece: what is kept of its steps does not grow with its length ---

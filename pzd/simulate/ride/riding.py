@@ -19,16 +19,12 @@ from pzd.simulate.ride.equations import balance_error, oil_energy, relax_oil, st
 from pzd.simulate.ride.linear import ride_exactly
 from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride_steps
 from pzd.simulate.ride.model import (
+    AIMS,
     BY_COEFFICIENTS,
     BY_TABLE,
     DYNAMIC,
-    FEEDBACK,
+    FIDELITIES,
     IDEAL,
-    MINIMISE,
-    PREDICT,
-    SCHEDULE,
-    SWITCH,
-    TABLE,
     UNBOUNDED,
     VOLTAGE,
     Axle,
@@ -51,16 +47,6 @@ from pzd.simulate.vehicle.car import HalfCar
 
 CourseSink = Callable[[int, Array], None]
 """Receives the rows of the course from a step on, which are written over afterwards."""
-_FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
-_AIMS = {
-    "damping": FEEDBACK,
-    "feedback": FEEDBACK,
-    "switch": SWITCH,
-    "minimise": MINIMISE,
-    "voltage": VOLTAGE,
-    "predict": PREDICT,
-    "schedule": SCHEDULE,
-}
 
 
 @dataclass(frozen=True)
@@ -107,7 +93,7 @@ def control_spec_of(
     config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, fixed: FixedValues
 ) -> ControlSpec:
     """Return policy, bounds and fidelity of a case as numbers."""
-    policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
+    policy, fidelity = case.policy, FIDELITIES[case.fidelity]
     bounds = BY_TABLE
     if fidelity == IDEAL:
         bounds = BY_TABLE if config.coefficients is None else BY_COEFFICIENTS
@@ -122,7 +108,7 @@ def control_spec_of(
     searched = fixed.searched.voltages if fixed.searched is not None else ()
     return ControlSpec(
         fidelity,
-        _AIMS[policy.aim],
+        AIMS[policy.aim],
         bounds,
         LEAST_LOAD if policy.tie_break == "least_load" else TIE_BREAKS[policy.tie_break or config.tie_break],
         *(config.coefficients or (0.0, np.inf)),

@@ -27,6 +27,10 @@ class Unevenness(Road):
     start_m: float = Field(default=10.0, ge=0.0)
     """Where it begins."""
 
+    @override
+    def own_name(self) -> str:
+        return f"{self.kind}-{self.height_m:g}m"
+
     @abstractmethod
     def shape(self, along: Array) -> Array:
         """Return the height as a share of `height_m` over the share 0 to 1 of the length."""
@@ -57,10 +61,6 @@ class Bump(Unevenness):
     """Length along the road."""
 
     @override
-    def own_name(self) -> str:
-        return f"bump-{self.height_m:g}m"
-
-    @override
     def shape(self, along: Array) -> Array:
         return np.asarray(0.5 * (1.0 - np.cos(2.0 * np.pi * along)))
 
@@ -82,10 +82,6 @@ class Hump(Unevenness):
         if 2.0 * self.ramp_m > self.length_m:
             raise ValueError(f"ramp_m: two ramps are longer than length_m (got {self.ramp_m:g} of {self.length_m:g} m)")
         return self
-
-    @override
-    def own_name(self) -> str:
-        return f"hump-{self.height_m:g}m"
 
     @override
     def shape(self, along: Array) -> Array:
@@ -124,10 +120,6 @@ class Step(Unevenness):
 
     kind: Literal["step"] = "step"
     """A lasting rise."""
-
-    @override
-    def own_name(self) -> str:
-        return f"step-{self.height_m:g}m"
 
     @override
     def shape(self, along: Array) -> Array:

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 from zlib import crc32
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.signals.iso8608 import classes, profile
+from pzd.signals.iso8608 import classes, known_class, profile
 from pzd.simulate.roads import END_REACH, Profile, Road, Way, through
 
 _PIECE = 1000.0
@@ -34,20 +34,13 @@ class Iso8608(Road):
 
     kind: Literal["iso8608"] = "iso8608"
     """A road of ISO 8608."""
-    road_class: str = "C"
+    road_class: Annotated[str, AfterValidator(known_class)] = "C"
     """Class A (very good) to H."""
     shortest_wave_m: float = Field(default=0.3, gt=0.0)
     """Waves shorter than this are left out: the tyre's footprint swallows them."""
     seed: int | None = Field(default=None, ge=0)
     """Of this road: the same seed gives the same road, in another run too. By default it comes from the
     seed of the run and the name of the road."""
-
-    @field_validator("road_class")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        if name not in classes():
-            raise ValueError(f"there is no class {name}; there are {', '.join(classes())}")
-        return name
 
     @override
     def own_name(self) -> str:

@@ -120,14 +120,14 @@ class OpenCrg(MeasuredRoad):
 
     @override
     def heights(self, path: Path, key: str) -> tuple[Array, Array]:
-        grid = read_grid(path)
-        low, high = float(grid.across[0]), float(grid.across[-1])
+        increment, across, heights = read_grid(path)
+        low, high = float(across[0]), float(across[-1])
         if not low <= self.offset_m <= high:
             raise ConfigError(
                 f"{key}.offset_m: {path} reaches from {low:g} to {high:g} m across the road (got {self.offset_m:g})"
             )
-        height = np.array([np.interp(self.offset_m, grid.across, row) for row in grid.heights])
-        return grid.increment * np.arange(len(height), dtype=np.float64), height
+        height = np.array([np.interp(self.offset_m, across, row) for row in heights])
+        return increment * np.arange(len(height), dtype=np.float64), height
 
 
 _WIDTHS = {"LRFI": 10, "LDFI": 20}
@@ -147,18 +147,6 @@ _SECTIONS = (
 _REFUSED = {"$ROAD_CRG_FILE": "includes another file", "$ROAD_CRG_MODS": "modifies what it holds"}
 
 
-@dataclass(frozen=True, eq=False)
-class CrgGrid:
-    """Heights of a road."""
-
-    increment: float
-    """Between two cross sections [m]."""
-    across: Array
-    """(m,) places v of the long sections, left of the reference line positive, rising [m]."""
-    heights: Array
-    """(n, m) [m], slope and banking of the reference line included."""
-
-
 @dataclass
 class _Head:
     """What stands before the data."""
@@ -168,8 +156,13 @@ class _Head:
     channels: list[str] = field(default_factory=list)
 
 
-def read_grid(path: Path) -> CrgGrid:
-    """Read a file.
+def read_grid(path: Path) -> tuple[float, Array, Array]:
+    """Read the heights of a road.
+
+    Returns
+    -------
+    distance between two cross sections [m]; (m,) places v of the long sections, left of the reference line positive,
+    rising [m]; and (n, m) heights [m], slope and banking of the reference line included
 
     Raises
     ------
@@ -195,7 +188,7 @@ def read_grid(path: Path) -> CrgGrid:
     heights = records[:, sections][:, order]
     slope, bank = (_channel(records, head, name) for name in ("slope", "banking"))
     along = np.concatenate([[0.0], np.cumsum(0.5 * increment * (slope[1:] + slope[:-1]))])
-    return CrgGrid(increment, across[order], heights + along[:, np.newaxis] + bank[:, np.newaxis] * across[order])
+    return increment, across[order], heights + along[:, np.newaxis] + bank[:, np.newaxis] * across[order]
 
 
 def _head(path: Path, lines: list[str]) -> tuple[_Head, int]:

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from pzd.artefacts import (
-    AXLE_COLUMNS,
-    Ending,
-    FoundRow,
-    Response,
-    Ride,
-    RideRow,
-    Rides,
-    SpectrumRow,
-    SummaryRow,
-    WeightedRow,
-    WheelRow,
-)
+from pzd.artefacts import AXLE_COLUMNS, Ending, FoundRow, Response, Ride, RideRow, Rides, SpectrumRow, WeightedRow
 from pzd.comfort.iso2631_1997 import evaluate, maximum_transient
 from pzd.comfort.spectrum import Components, harmonics, third_octaves
 from pzd.comfort.weighting import WK, weighted
@@ -46,6 +35,8 @@ from pzd.simulate.ride.riding import CourseSink, FixedValues, SearchResult, cloc
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.study.plan import Case
 
+log = logging.getLogger(__name__)
+
 # --- Weighted measures of a ride, and what its vibration is made of ---
 
 _PERIODIC = 0.98
@@ -54,38 +45,22 @@ _TONE = 0.999
 """Share of the mean square in one harmonic that makes a ride a tone."""
 
 
-@dataclass(frozen=True)
-class Vibration:
-    """The weighted measures of a ride, and the spectrum of its acceleration."""
-
-    weighted: WeightedRow
-    spectrum: tuple[SpectrumRow, ...]
-
-
-def vibration(
-    case: str, point: str, acceleration: Array, step: float, window: Window, fundamental: float | None, lead: int = 0
-) -> Vibration:
-    """Weight the whole ride from its start, then keep the window.
+def weighted_row(case: str, acceleration: Array, rate: float, window: Window, lead: int = 0) -> WeightedRow:
+    """Weight the whole ride from its start, and take its measures in the window.
 
     Parameters
     ----------
-    case, point : of the ride
-    acceleration : (m,) of the whole ride from rest, at every step [m/s2]
-    step : [s]
+    case : name of the ride
+    acceleration : (m,) at K of the whole ride from rest [m/s2]
+    rate : of its steps [Hz]
     window : in which the ride is judged
-    fundamental : frequency of the road, None where it is not harmonic [Hz]
     lead : steps before the window into which the running r.m.s. of its first second reaches
-
-    Returns
-    -------
-    the weighted measures in the window, and the spectrum
     """
-    rate = 1.0 / step
     history = weighted(acceleration, rate)
     found = evaluate(history[window.steps], rate)
-    row = WeightedRow(
+    return WeightedRow(
         case=case,
-        point=point,
+        point=POINT,
         weighting=WK.name,
         duration_s=found.duration,
         a_w_m_per_s2=found.a_w,
@@ -93,12 +68,15 @@ def vibration(
         MTVV_m_per_s2=maximum_transient(history[window.first - lead : window.last + 1], rate) if lead else found.mtvv,
         VDV_m_per_s1_75=found.vdv,
     )
-    parts, method = components(acceleration[window.steps], rate, fundamental)
-    spectrum = tuple(
-        SpectrumRow(case=case, point=point, method=method, frequency_Hz=float(f), rms_m_per_s2=float(level))
+
+
+def spectrum_rows(case: str, acceleration: Array, rate: float, fundamental: float | None) -> tuple[SpectrumRow, ...]:
+    """Return the components of an acceleration at K, see `components`."""
+    parts, method = components(acceleration, rate, fundamental)
+    return tuple(
+        SpectrumRow(case=case, point=POINT, method=method, frequency_Hz=float(f), rms_m_per_s2=float(level))
         for f, level in zip(parts.frequency, parts.rms, strict=True)
     )
-    return Vibration(row, spectrum)
 
 
 def components(acceleration: Array, rate: float, fundamental: float | None) -> tuple[Components, str]:
@@ -134,19 +112,16 @@ class RideRows:
     """One ride as the artefact holds it: its history, and a row or more of each table."""
 
     ride: Ride
-    summary: SummaryRow
     ridden: RideRow
-    wheels: tuple[WheelRow, ...]
-    weighted: WeightedRow
-    spectrum: tuple[SpectrumRow, ...]
+    rows: WindowRows
     found: tuple[FoundRow, ...]
 
 
 class Gathering:
-    """Rides are judged as soon as their window is known, and then forgotten but for their histories.
+    """Evaluates the rides of a config, each as soon as its window is known; only its history and rows are kept.
 
-    On a road that goes on and on that is at once, and a long ride is judged piece by piece while it goes. Those over a
-    single event wait for each other, since they are judged over the same time.
+    On a road that goes on and on the window is known at once, and a long ride is evaluated piece by piece while it
+    goes. Rides over a single event wait for each other, since they are compared over the same time.
     """
 
     def __init__(self, config: SimulateConfig, with_voltage: bool) -> None:
@@ -163,6 +138,7 @@ class Gathering:
         case : the case
         ridden : rides it, see `Setup.ridden`
         """
+        log.info("simulate: %s", case.name)
         if event_of(case.road, self._config) is not None:
             return ridden(case, None)
         clock = clock_of(self._config)
@@ -200,11 +176,11 @@ class Gathering:
         found = [every[case.name] for case in planned]
         return Rides(
             tuple(one.ride for one in found if one.ridden.history != "none"),
-            tuple(one.summary for one in found),
+            tuple(one.rows.summary for one in found),
             tuple(one.ridden for one in found),
-            tuple(row for one in found for row in one.wheels),
-            tuple(one.weighted for one in found),
-            tuple(row for one in found for row in one.spectrum),
+            tuple(row for one in found for row in one.rows.wheels),
+            tuple(one.rows.weighted for one in found),
+            tuple(row for one in found for row in one.rows.spectrum),
             responses,
             tuple(row for one in found for row in one.found),
         )
@@ -219,17 +195,16 @@ class Gathering:
 
     def _in_window(self, case: Case, outcome: Outcome, window: Window, lead: int | None = None) -> WindowRows:
         """Take the numbers of a ride in a window, or those of a piece of it with a lead before it, see `Pieces`."""
-        name = case.name
+        name, rate, within = case.name, 1.0 / outcome.step, outcome.comfort[window.steps]
         fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
-        found = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental, lead or 0)
-        bands = found.spectrum
+        spectrum = bands = spectrum_rows(name, within, rate, fundamental)
         if lead is not None and fundamental is not None:
-            bands = vibration(name, POINT, outcome.comfort, outcome.step, window, None).spectrum
+            bands = spectrum_rows(name, within, rate, None)
         return WindowRows(
             summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window),
             tuple(wheel_rows(name, outcome, window, self._config.car.car().static_loads())),
-            found.weighted,
-            found.spectrum,
+            weighted_row(name, outcome.comfort, rate, window, lead or 0),
+            spectrum,
             bands,
         )
 
@@ -243,7 +218,7 @@ class Gathering:
         rows: WindowRows | None = None,
     ) -> RideRows:
         """Return a ride as the artefact holds it; its rows are taken in the window where none are given."""
-        rows, aim = rows or self._in_window(case, outcome, window), case.policy.aim
+        aim = case.policy.aim
         without: tuple[str, ...] = (_VOLTAGE,) if case.fidelity == "ideal" or not self._with_voltage else ()
         without += (_DEMANDED,) if aim in ("voltage", "schedule") else ()
         ridden = RideRow(
@@ -255,8 +230,12 @@ class Gathering:
             damping_Ns_per_m=fixed.damping if aim == "damping" else None,
             history=self._config.histories,
         )
-        history, found = history_of(case.name, outcome, without), tuple(_found_rows(case.name, fixed.searched))
-        return RideRows(history, rows.summary, ridden, rows.wheels, rows.weighted, rows.spectrum, found)
+        return RideRows(
+            history_of(case.name, outcome, without),
+            ridden,
+            rows or self._in_window(case, outcome, window),
+            tuple(_found_rows(case.name, fixed.searched)),
+        )
 
 
 def _found_rows(case: str, found: SearchResult | None) -> Iterator[FoundRow]:

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from pzd.artefacts import Table
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
 from pzd.schema.errors import ConfigError
 from pzd.simulate.config import CarBlock, Fidelity, SimulateConfig
 from pzd.simulate.policies import Policy, policies
@@ -13,11 +14,6 @@ from pzd.simulate.roads import Road
 from pzd.simulate.roads.sine import Sine
 
 # --- What the config may ask of a table: a temperature and a voltage that it covers ---
-
-_SAME_DEGREES = 2.0
-"""Temperatures this close are one condition of the rig, see `identify.group` [K]."""
-_SAME_VOLTAGE = 0.02
-"""Voltages closer than this share of the largest are one condition of the rig, see `identify.group`."""
 
 
 def checked_temperature(config: SimulateConfig, table: Table) -> float | None:
@@ -33,11 +29,8 @@ def checked_temperature(config: SimulateConfig, table: Table) -> float | None:
         return known[0] if known else None
     if not known:
         raise ConfigError(f"simulate.temperature_degC: the table has no temperature; leave it out (got {asked:g})")
-    if not known[0] - _SAME_DEGREES <= asked <= known[-1] + _SAME_DEGREES:
-        raise ConfigError(
-            f"simulate.temperature_degC: must lie within the table, {_span(known)} degC; "
-            f"test the damper at it, or ride at a temperature that was tested (got {asked:g})"
-        )
+    advice = " degC; test the damper at it, or ride at a temperature that was tested"
+    _check_within("temperature_degC", asked, known, SAME_TEMPERATURE, advice)
     return asked
 
 
@@ -54,13 +47,14 @@ def checked_voltage(config: SimulateConfig, table: Table) -> None:
         return
     if not known:
         raise ConfigError(f"simulate.passive_voltage_V: the rig records no voltage; leave it out (got {asked:g})")
-    apart = _SAME_VOLTAGE * max(abs(known[0]), abs(known[-1]))
-    if not known[0] - apart <= asked <= known[-1] + apart:
-        raise ConfigError(f"simulate.passive_voltage_V: must lie within the table, {_span(known)} (got {asked:g})")
+    _check_within("passive_voltage_V", asked, known, CONSTANT_SHARE * max(abs(known[0]), abs(known[-1])))
 
 
-def _span(known: list[float]) -> str:
-    return f"{known[0]:g}" if known[0] == known[-1] else f"{known[0]:g} to {known[-1]:g}"
+def _check_within(key: str, asked: float, known: list[float], margin: float, advice: str = "") -> None:
+    """Refuse a value beyond the known ones, rising, by more than the margin within which two are one condition."""
+    if not known[0] - margin <= asked <= known[-1] + margin:
+        span = f"{known[0]:g}" if known[0] == known[-1] else f"{known[0]:g} to {known[-1]:g}"
+        raise ConfigError(f"simulate.{key}: must lie within the table, {span}{advice} (got {asked:g})")
 
 
 # --- What a ride assumes where the config does not say it: car, lag of the valve, bounds, sensors and supply ---
@@ -76,26 +70,26 @@ def assumed(config: SimulateConfig, effects: Collection[str], with_voltage: bool
     with_voltage : whether the rig has a control signal
     """
     lines = [*_car(config.car)]
-    said = config.model_fields_set
+    given = config.model_fields_set
     if (
         with_voltage
         and "dynamic" in config.fidelities
         and "valve_lag" not in effects
-        and "valve_response_s" not in said
+        and "valve_response_s" not in given
     ):
         lines.append(
             f"the valve follows with a time constant of {1000.0 * config.valve_response_s:g} ms, that of the damper of "
             "Makowski and Knap 2021 (simulate.valve_response_s)"
         )
     controls = config.policies is None or any(policies()[name].controlled for name in config.policies)
-    if with_voltage and controls and "ideal" in config.fidelities and not said & {"bounds", "c_min_Ns_per_m"}:
+    if with_voltage and controls and "ideal" in config.fidelities and not given & {"bounds", "c_min_Ns_per_m"}:
         lines.append("ideal forces are bounded by the damper's own table (simulate.bounds)")
     if with_voltage and controls and set(config.fidelities) != {"ideal"}:
         perfect = {
             "sensors": "controllers see the ride exactly and at once (simulate.sensors)",
             "supply": "the voltage that they ask for is set exactly and at once (simulate.supply)",
         }
-        lines += [line for key, line in perfect.items() if key not in said]
+        lines += [line for key, line in perfect.items() if key not in given]
     return tuple(lines)
 
 
@@ -106,12 +100,12 @@ _NOT_ASSUMED = ("model", "name", "unsprung_mass_kg", "tyre_stiffness_N_per_m", "
 def _car(block: CarBlock) -> list[str]:
     if "model" in block.model_fields_set:
         return []
-    unsaid = [key for key in CarBlock.model_fields if key not in _NOT_ASSUMED and getattr(block, key) is None]
+    assumed_keys = [key for key in CarBlock.model_fields if key not in _NOT_ASSUMED and getattr(block, key) is None]
     car = block.car()
     if block.model_fields_set.isdisjoint(set(CarBlock.model_fields) - {"name"}):
         springs = " and ".join(f"{k / 1000.0:g}" for k in car.stiffnesses)
         return [f"the car is {block.model}: {car.mass:g} kg on springs of {springs} kN/m (simulate.car)"]
-    return [f"of the car {', '.join(unsaid)} are those of {block.model} (simulate.car)"] if unsaid else []
+    return [f"of the car {', '.join(assumed_keys)} are those of {block.model} (simulate.car)"] if assumed_keys else []
 
 
 # --- The cases ---

@@ -96,8 +96,7 @@ class HalfCar:
         (2,) D [1/kg]; a_K = D^T (S + T)
         """
         direction = np.array([1.0, self.comfort_point])
-        d: Array = -direction @ np.linalg.solve(self.mass_matrix(), self.force_directions())
-        return d
+        return np.asarray(-direction @ np.linalg.solve(self.mass_matrix(), self.force_directions()))
 
     def mobility(self) -> Array:
         """Return how the suspensions accelerate under their own forces.

@@ -60,7 +60,7 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     rows = published()
     cold, warm = (
         measure.work_per_cycle_J * (measure.frequency_Hz or 0.0)
-        for measure in (data.test_of(rows[name]).measure for name in (COLD, WARM))
+        for measure in (data.test(rows[name].conditions).measure for name in (COLD, WARM))
     )
     start, end = rows["TEMP-start"].number, rows["TEMP-end"].number
     time, temperature = heating(cold, warm, start, end)

@@ -31,7 +31,7 @@ def measured(data: FigureData, labels: Mapping[str, str], what: str) -> Iterator
     curves, captions = [], []
     for name, label in labels.items():
         row = published()[name]
-        test = data.test_of(row)
+        test = data.test(row.conditions)
         curves.append(Curve(label, test.cycle(), test))
         captions.append(f"{label}: {test.measure.peak_force_N:.0f} N, paper {row.number:.0f} N")
     alt = f"Measured force over displacement and velocity at {what}."

@@ -6,6 +6,7 @@ A file declares its block as `WAVEFORM`.
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Callable
@@ -29,14 +30,19 @@ class Waveform(OneOfAKind):
     usual_cycles: ClassVar[int] = 10
     """Cycles of a test that says nothing of its length."""
 
-    @abstractmethod
+    @property
+    def lowest_frequency(self) -> float:
+        """Lowest frequency of the motion [Hz]; infinite where it has no frequencies."""
+        return math.inf
+
     def cycle(self, folder: Path) -> float:
         """Return the time after which the motion repeats, or ends where it does not repeat [s]."""
+        return 1.0 / self.lowest_frequency
 
     @property
     def settling_time(self) -> float:
-        """Length of the lead-in after which the transient of the start has died out [s]."""
-        return 1.0
+        """Two cycles of the lowest frequency, or a second: then the transient of the start has died out [s]."""
+        return max(2.0 / self.lowest_frequency, 1.0)
 
     @abstractmethod
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
@@ -47,11 +53,6 @@ class Waveform(OneOfAKind):
         draw : generator of random phases
         folder : of the config, for motions that are read
         """
-
-
-def two_cycles(frequency: float) -> float:
-    """Return the length [s] of two cycles at a frequency [Hz], at least a second."""
-    return max(2.0 / frequency, 1.0)
 
 
 def started(course: Course, lead: float) -> Course:
@@ -81,6 +82,24 @@ def started(course: Course, lead: float) -> Course:
     return motion
 
 
+class Periodic(Waveform):
+    """A motion of one frequency and one amplitude."""
+
+    frequency_Hz: float = Field(gt=0.0)
+    """Frequency."""
+    amplitude_m: float = Field(gt=0.0)
+    """Amplitude, half the stroke."""
+
+    def own_name(self) -> str:
+        """Return the name made of its parameters: `sine-2Hz-0.03m`."""
+        return f"{self.kind}-{self.frequency_Hz:g}Hz-{self.amplitude_m:g}m"
+
+    @property
+    def lowest_frequency(self) -> float:
+        """Its frequency [Hz]."""
+        return self.frequency_Hz
+
+
 class Lines(Waveform):
     """A motion of lines at the multiples of 1 / period inside a band."""
 
@@ -104,9 +123,9 @@ class Lines(Waveform):
         return self.period_s
 
     @property
-    def settling_time(self) -> float:
-        """Two cycles at the lowest frequency, or a second."""
-        return two_cycles(self.low_Hz)
+    def lowest_frequency(self) -> float:
+        """Lowest frequency of the band [Hz]."""
+        return self.low_Hz
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from pzd.quantities import DISPLACEMENT, TIME, Control
-from pzd.record import Array
+from pzd.record import Array, clock_fault
 from pzd.rig.stand.waveforms import Course, Waveform
 from pzd.schema.csvfile import read_columns
 from pzd.schema.errors import ConfigError, DataError, at
@@ -69,11 +69,10 @@ def _read(path: Path) -> tuple[Array, Array]:
         raise ConfigError(f"{path}: the file of the waveform is missing; the path is relative to the config's folder")
     columns = read_columns(path, (TIME.column, DISPLACEMENT.column), Control())
     time, displacement = columns[TIME.column], columns[DISPLACEMENT.column]
-    wrong = np.flatnonzero(np.diff(time) <= 0.0)
     if time.size < 4:
         raise DataError(f"{at(path)}: a motion needs four samples or more (got {time.size})")
-    if wrong.size:
-        raise DataError(f"{at(path, int(wrong[0]) + 3)}: time does not increase (got {time[wrong[0] + 1]:g})")
+    if fault := clock_fault(time):
+        raise DataError(f"{at(path, fault[0] + 2)}: {fault[1]}")
     return time, displacement
 
 

@@ -8,15 +8,15 @@ the road itself by `pzd.signals.iso8608`. Below f_body the body follows the road
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
 from pzd.record import Array
 from pzd.rig.stand.waveforms import Course, Lines
 from pzd.signals.harmonics import FourierSum
-from pzd.signals.iso8608 import classes, profile
+from pzd.signals.iso8608 import classes, known_class, profile
 
 _FINE = 64  # points a turn of the highest line in the search for the peak
 
@@ -26,7 +26,7 @@ class RoadMotion(Lines):
 
     kind: Literal["road"] = "road"
     """The deflection of a suspension on an ISO 8608 road."""
-    road_class: str = "C"
+    road_class: Annotated[str, AfterValidator(known_class)] = "C"
     """Class A (very good) to H (very poor) of ISO 8608."""
     vehicle_speed_km_per_h: float = Field(default=72.0, gt=0.0)
     """Speed of the vehicle."""
@@ -38,13 +38,6 @@ class RoadMotion(Lines):
     """Damping ratio of the body."""
     peak_m: float | None = Field(default=None, gt=0.0)
     """Scales the motion to this largest displacement, to suit the stroke of the stand; by default not scaled."""
-
-    @field_validator("road_class")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        if name not in classes():
-            raise ValueError(f"a road class is one of {', '.join(classes())} (got {name})")
-        return name
 
     def own_name(self) -> str:
         """Return the name made of its parameters: `road-C-72km_per_h`."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
+from pzd.rig.stand.waveforms import Course, Waveform
 
 
 class Sweep(Waveform):
@@ -53,9 +53,9 @@ class Sweep(Waveform):
         return max(round(mean * self.period_s), 1) / mean
 
     @property
-    def settling_time(self) -> float:
-        """Two cycles at the lowest frequency, or a second."""
-        return two_cycles(self.low_Hz)
+    def lowest_frequency(self) -> float:
+        """Lowest frequency of the sweep [Hz]."""
+        return self.low_Hz
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """Return the sweep."""

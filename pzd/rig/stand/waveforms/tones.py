@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
+from pzd.rig.stand.waveforms import Course, Waveform
 from pzd.signals.harmonics import FourierSum
 
 
@@ -40,14 +40,10 @@ class Tones(Waveform):
         """Return the name made of its parameters: `tones-1-2.7Hz-0.02m`, the amplitude that of the first."""
         return f"tones-{'-'.join(f'{f:g}' for f in self.frequencies_Hz)}Hz-{self.amplitudes_m[0]:g}m"
 
-    def cycle(self, folder: Path) -> float:
-        """Return one cycle of the lowest tone."""
-        return 1.0 / min(self.frequencies_Hz)
-
     @property
-    def settling_time(self) -> float:
-        """Two cycles of the lowest tone, or a second."""
-        return two_cycles(min(self.frequencies_Hz))
+    def lowest_frequency(self) -> float:
+        """Frequency of the lowest tone [Hz]."""
+        return min(self.frequencies_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """Return the sum of the sines, each exactly."""

@@ -15,37 +15,22 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
+from pzd.rig.stand.waveforms import Course, Periodic
 from pzd.signals.harmonics import FourierSum
 
 _SMALLEST = 1e-10
 """Harmonics whose speed is below this share of the constant speed are left out."""
 
 
-class Triangle(Waveform):
+class Triangle(Periodic):
     """A motion of constant speed, band-limited."""
 
     kind: Literal["triangle"] = "triangle"
     """Constant speed both ways."""
-    frequency_Hz: float = Field(gt=0.0)
-    """Frequency."""
     amplitude_m: float = Field(gt=0.0)
     """Amplitude of the triangle before its corners are rounded: the speed is 4 A f."""
     bandwidth_Hz: float = Field(default=30.0, gt=0.0)
     """Bandwidth of the actuator (-3 dB), which rounds the corners."""
-
-    def own_name(self) -> str:
-        """Return the name made of its parameters: `triangle-1Hz-0.02m`."""
-        return f"triangle-{self.frequency_Hz:g}Hz-{self.amplitude_m:g}m"
-
-    def cycle(self, folder: Path) -> float:
-        """Return 1 / f."""
-        return 1.0 / self.frequency_Hz
-
-    @property
-    def settling_time(self) -> float:
-        """Two cycles, or a second."""
-        return two_cycles(self.frequency_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """Return the sum of the harmonics that the actuator passes."""

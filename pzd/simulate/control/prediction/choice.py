@@ -181,27 +181,27 @@ def _best_held_on(model: RideModel, plan: Predictor) -> float:
 @compiled
 def _look_ahead(time: float, model: RideModel, plan: Predictor) -> None:
     """Fill the road ahead in every course that it may take."""
-    car, road, room = model.car, model.road_coefficients, plan.workspace
+    car, road, workspace = model.car, model.road_coefficients, plan.workspace
     hold = plan.settings.hold_steps * plan.steps[Step.HELD]
     if plan.settings.known:
-        fill_known(time, car, road, plan.steps[Step.HELD], room.hold_heights[0])
-        fill_known(time + hold, car, road, plan.steps[Step.TAIL], room.tail_heights[0])
+        fill_known(time, car, road, plan.steps[Step.HELD], workspace.hold_heights[0])
+        fill_known(time + hold, car, road, plan.steps[Step.TAIL], workspace.tail_heights[0])
         return
     learn(plan, plan.observed.passed[int(plan.observed.measured[Memory.OBSERVATIONS]) % plan.observed.passed.size])
     delay = (road.behind[1] - road.behind[0]) / car.speed
     for course in range(plan.settings.courses):
-        fill_forecast(plan, course, 0.0, delay, plan.steps[Step.HELD], room.hold_heights[course])
-        fill_forecast(plan, course, hold, delay, plan.steps[Step.TAIL], room.tail_heights[course])
+        fill_forecast(plan, course, 0.0, delay, plan.steps[Step.HELD], workspace.hold_heights[course])
+        fill_forecast(plan, course, hold, delay, plan.steps[Step.TAIL], workspace.tail_heights[course])
 
 
 @inlined
 def _held_cost(model: RideModel, plan: Predictor, i: int, j: int, most: float) -> float:
     """Return the cost of holding a pair of candidates in all courses together; their states are left in `states`."""
-    room, cost = plan.workspace, 0.0
+    workspace, cost = plan.workspace, 0.0
     for course in range(plan.settings.courses):
-        state, heights = room.states[States.HOLDING + course], room.hold_heights[course]
-        copy_into(room.states[States.NOW], state)
-        one, two = room.hold_levels[0, i], room.hold_levels[1, j]
+        state, heights = workspace.states[States.HOLDING + course], workspace.hold_heights[course]
+        copy_into(workspace.states[States.NOW], state)
+        one, two = workspace.hold_levels[0, i], workspace.hold_levels[1, j]
         cost += predicted(model.car, plan, state, one, two, heights, Step.HELD, most - cost)
     return cost
 
@@ -209,12 +209,12 @@ def _held_cost(model: RideModel, plan: Predictor, i: int, j: int, most: float) -
 @inlined
 def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, most: float) -> float:
     """Return the cost of what was held and of a pair of tails behind it, in all courses together."""
-    room = plan.workspace
+    workspace = plan.workspace
     for course in range(plan.settings.courses):
         if cost < most:
-            state, heights = room.states[States.END], room.tail_heights[course]
-            copy_into(room.states[States.HOLDING + course], state)
-            one, two = room.tail_levels[0, a], room.tail_levels[1, b]
+            state, heights = workspace.states[States.END], workspace.tail_heights[course]
+            copy_into(workspace.states[States.HOLDING + course], state)
+            one, two = workspace.tail_levels[0, a], workspace.tail_levels[1, b]
             cost += predicted(model.car, plan, state, one, two, heights, Step.TAIL, most - cost)
     return cost
 
@@ -222,17 +222,17 @@ def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, m
 @compiled
 def _fill_levels(time: float, damper: DynamicDamper, plan: Predictor, control: Array) -> None:
     """Fill the levels of the effective voltage under every candidate, and under every tail behind it."""
-    hold, room = plan.settings.hold_steps * plan.steps[Step.HELD], plan.workspace
+    hold, workspace = plan.settings.hold_steps * plan.steps[Step.HELD], plan.workspace
     for axle in range(2):
-        now, behind = room.drive[0, axle], room.drive[1, axle]
+        now, behind = workspace.drive[0, axle], workspace.drive[1, axle]
         copy_into(control[Command.BEHIND :, axle], now)
         keep_voltage(control[Command.SET, axle], time - control[Command.SINCE, 0], now, damper.drive)
         for i in range(plan.candidates.size):
-            _follow(plan.damper, damper, plan.candidates[i], plan.steps[Step.HELD], now, room.hold_levels[axle, i])
+            _follow(plan.damper, damper, plan.candidates[i], plan.steps[Step.HELD], now, workspace.hold_levels[axle, i])
             for j in range(plan.tails.size):
                 copy_into(now, behind)
                 keep_voltage(plan.candidates[i], hold, behind, damper.drive)
-                levels = room.tail_levels[axle, i * plan.tails.size + j]
+                levels = workspace.tail_levels[axle, i * plan.tails.size + j]
                 _follow(plan.damper, damper, plan.tails[j], plan.steps[Step.TAIL], behind, levels)
 
 

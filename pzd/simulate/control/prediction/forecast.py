@@ -1,8 +1,7 @@
 """The road ahead: known, or forecast from what has passed under the front axle; and the road that the sensors give.
 
 Forecasts are a linear prediction of the mean speeds of the road from choice to choice, trusted as far as those before
-came true. What they missed of late, the innovations, may come again: one course of the road has them added, the other
-subtracted.
+came true. Their recent errors, the innovations, may recur: one course of the road has them added, the other subtracted.
 """
 
 from __future__ import annotations
@@ -136,7 +135,7 @@ def _solve(moments: Array, rows: Array, theta: Array) -> None:
 
 @inlined
 def unforeseen(plan: Predictor) -> float:
-    """Return the share of the mean square of the road's speed that forecasts of one period missed of late."""
+    """Return the recent mean square error of forecasts of one period, as a share of that of the road's speed."""
     missed, passed = plan.forecast.speeds[Speed.MISSED_SQUARES], plan.forecast.speeds[Speed.SPEED_SQUARES]
     return 0.0 if passed < _STILL else float(min(missed / passed, 1.0))
 
@@ -150,7 +149,7 @@ def fill_forecast(plan: Predictor, course: int, start: float, delay: float, h: f
     Parameters
     ----------
     plan : with what was observed and forecast
-    course : 0 with what was missed of late added, 1 with it subtracted
+    course : 0 with the recent innovations added, 1 with them subtracted
     start : [s]
     delay : of axle 2 behind axle 1 [s]
     h : [s]

@@ -103,15 +103,16 @@ def predicted(
     levels1, levels2 : (2 n + 1,) level of the effective voltage of each axle at every half step
     heights : (2, n + 1) of the road under both axles [m]
     kind : of the step, see `Step`
-    most : the cost beyond which nobody asks for more
+    most : cost beyond which the integration stops [m2/s3]
 
     Returns
     -------
     cost [m2/s3]; infinite where it goes beyond `most`
     """
     z, phi, dz, dphi, e1, e2, w1, w2 = state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]
-    g1, g2 = _wheel(car, state[Plant.WHEELS], heights[0, 0]), _wheel(car, state[Plant.WHEELS + 1], heights[1, 0])
-    dg1, dg2 = state[Plant.WHEELS + 2], state[Plant.WHEELS + 3]
+    wheels = state[Plant.WHEELS :]
+    g1, g2 = _wheel(car, wheels[0], heights[0, 0]), _wheel(car, wheels[1], heights[1, 0])
+    dg1, dg2 = wheels[2], wheels[3]
     h, modes, weights = plan.steps[kind], plan.modes[kind], plan.workspace.load_weights
     rise1, rise2 = (heights[0, 1] - heights[0, 0]) / h, (heights[1, 1] - heights[1, 0]) / h
     u1 = z + car.arms[0] * phi - g1
@@ -154,12 +155,7 @@ def predicted(
     state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7] = z, phi, dz, dphi, e1, e2, w1, w2
     state[Plant.WEIGHTED], state[Plant.LOAD_1], state[Plant.LOAD_2] = weighted, tyre1, tyre2
     if car.wheels:
-        state[Plant.WHEELS], state[Plant.WHEELS + 1], state[Plant.WHEELS + 2], state[Plant.WHEELS + 3] = (
-            g1,
-            g2,
-            dg1,
-            dg2,
-        )
+        wheels[0], wheels[1], wheels[2], wheels[3] = g1, g2, dg1, dg2
     return cost
 
 
