@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pzd.artefacts import ForceRow, Gap
-from pzd.report.blocks import Card, Pictures, Section, amount, listed, number, percent, sentence, spelled
+from pzd.report.blocks import WIDE, Card, Pictures, Section, amount, listed, number, percent, sentence, spelled
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
 from pzd.report.drawing import PLACES, pictures
@@ -227,5 +227,5 @@ def render(
         keep_trailing_newline=True,
     )
     return environment.get_template("report.html").render(
-        title=title, cards=headline, assumed=assumed, sections=sections, footer=footer
+        title=title, cards=headline, assumed=assumed, sections=sections, footer=footer, wide=WIDE
     )

@@ -19,7 +19,7 @@ from pzd.artefacts import (
 )
 from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
-from pzd.artefacts.identified import AVERAGED, courses
+from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
 from pzd.artefacts.knee import DIRECTIONS
 from pzd.artefacts.rig import slowest_test_force
 from pzd.artefacts.table import at_largest_speed
@@ -89,115 +89,94 @@ def _base_value(row: ParameterRow | BaseRow, name: str) -> Estimate:
 
 def characteristics(found: Characteristics, control: Control) -> Iterator[Table]:
     """Yield the tables of what the tests show without any model: those that have rows."""
+    setting, _, temperature = conditions(control)
+
+    def static_force(row: GasAndFrictionRow, value: float) -> Difference:
+        return Difference(value, slowest_test_force(found, row))
+
     tables = (
-        peak_velocity(found, control),
-        gas_and_friction(found, control),
-        steps(found, control),
-        warm_up(found, control),
-        as_it_stands(found, control),
+        Table(
+            "Force at the peak speed of each test (PVP), rebound positive",
+            (
+                *conditions(control),
+                Column("velocity_m_per_s", "speed", "m/s", lambda row: row.speed),
+                Column("rebound_force_N", "rebound", "N"),
+                Column("compression_force_N", "compression", "N"),
+                Column("kind", "test"),
+                Column("amplitude_m", "amplitude", "mm", factor=1000.0),
+                Column("frequency_Hz", "frequency", "Hz", optional=True),
+                Column("record", "record"),
+            ),
+            found.peak_velocity,
+            FOLD,
+        ),
+        Table(
+            "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
+            (
+                *conditions(control),
+                Column("gas_force_N", "gas force", "N", lambda row: static_force(row, row.gas_force_N)),
+                Column("friction_N", "friction", "N", lambda row: static_force(row, row.friction_N)),
+                Column("velocity_m_per_s", "slowest speed", "m/s"),
+                Column("method", "how"),
+            ),
+            found.gas_and_friction,
+            FOLD,
+        ),
+        Table(
+            f"Measured response to steps of the {control.name}",
+            (
+                setting,
+                temperature,
+                Column("voltage_V", "step", control.unit, lambda row: Span(row.from_voltage_V, row.to_voltage_V)),
+                Column("velocity_m_per_s", "speed", "m/s"),
+                Column("force_N", "force", "N", lambda row: Span(row.from_force_N, row.to_force_N)),
+                Column("to_63_percent_s", "to 63 %", "ms", factor=1000.0),
+                Column("to_90_percent_s", "to 90 %", "ms", factor=1000.0),
+                Column("status", "status"),
+                Column("record", "record"),
+                Column("time_s", "at", "s", digits=4),
+            ),
+            found.steps,
+            FOLD,
+        ),
+        Table(
+            f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last",
+            (
+                *conditions(control, lambda course: course.first)[:2],
+                Column("velocity_m_per_s", "speed", "m/s", lambda course: course.first.velocity_m_per_s),
+                Column("cycles", "cycles"),
+                _course("temperature_degC", "temperature", "degC"),
+                _course("rebound_force_N", "rebound", "N"),
+                _course("compression_force_N", "compression", "N"),
+                Column("record", "record", value=lambda course: course.first.record),
+            ),
+            courses(found.warm_up),
+            FOLD,
+        ),
+        Table(
+            "Records that are none of these tests, as they stand: extremes of all samples",
+            (
+                *conditions(control),
+                Column("force_N", "force", "N", lambda r: Span(r.compression_force_N, r.rebound_force_N)),
+                Column(
+                    "velocity_m_per_s",
+                    "velocity",
+                    "m/s",
+                    lambda row: Span(row.compression_velocity_m_per_s, row.rebound_velocity_m_per_s),
+                ),
+                Column("stroke_m", "stroke", "mm", factor=1000.0),
+                Column("duration_s", "duration", "s"),
+                Column("record", "record"),
+            ),
+            found.as_it_stands,
+            FOLD,
+        ),
     )
     return (table for table in tables if table.rows)
 
 
-def peak_velocity(found: Characteristics, control: Control) -> Table:
-    """Return the force at the peak speed of each test (PVP)."""
-    return Table(
-        "Force at the peak speed of each test (PVP), rebound positive",
-        (
-            *conditions(control),
-            Column("velocity_m_per_s", "speed", "m/s", lambda row: row.speed),
-            Column("rebound_force_N", "rebound", "N"),
-            Column("compression_force_N", "compression", "N"),
-            Column("kind", "test"),
-            Column("amplitude_m", "amplitude", "mm", factor=1000.0),
-            Column("frequency_Hz", "frequency", "Hz", optional=True),
-            Column("record", "record"),
-        ),
-        found.peak_velocity,
-        FOLD,
-    )
-
-
-def gas_and_friction(found: Characteristics, control: Control) -> Table:
-    """Return gas force and friction at mid-stroke."""
-    return Table(
-        "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
-        (
-            *conditions(control),
-            Column("gas_force_N", "gas force", "N", lambda r: Difference(r.gas_force_N, slowest_test_force(found, r))),
-            Column("friction_N", "friction", "N", lambda r: Difference(r.friction_N, slowest_test_force(found, r))),
-            Column("velocity_m_per_s", "slowest speed", "m/s"),
-            Column("method", "how"),
-        ),
-        found.gas_and_friction,
-        FOLD,
-    )
-
-
-def steps(found: Characteristics, control: Control) -> Table:
-    """Return the response to steps of the control signal."""
-    setting, _, temperature = conditions(control)
-    return Table(
-        f"Measured response to steps of the {control.name}",
-        (
-            setting,
-            temperature,
-            Column("voltage_V", "step", control.unit, lambda row: Span(row.from_voltage_V, row.to_voltage_V)),
-            Column("velocity_m_per_s", "speed", "m/s"),
-            Column("force_N", "force", "N", lambda row: Span(row.from_force_N, row.to_force_N)),
-            Column("to_63_percent_s", "to 63 %", "ms", factor=1000.0),
-            Column("to_90_percent_s", "to 90 %", "ms", factor=1000.0),
-            Column("status", "status"),
-            Column("record", "record"),
-            Column("time_s", "at", "s", digits=4),
-        ),
-        found.steps,
-        FOLD,
-    )
-
-
-def warm_up(found: Characteristics, control: Control) -> Table:
-    """Return from where to where the force of a long test goes."""
-    return Table(
-        f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last",
-        (
-            *conditions(control, lambda course: course.first)[:2],
-            Column("velocity_m_per_s", "speed", "m/s", lambda course: course.first.velocity_m_per_s),
-            Column("cycles", "cycles"),
-            _course("temperature_degC", "temperature", "degC"),
-            _course("rebound_force_N", "rebound", "N"),
-            _course("compression_force_N", "compression", "N"),
-            Column("record", "record", value=lambda course: course.first.record),
-        ),
-        courses(found.warm_up),
-        FOLD,
-    )
-
-
 def _course(name: str, head: str, unit: str) -> Column:
     return Column(name, head, unit, lambda course: Span(getattr(course.first, name), getattr(course.last, name)))
-
-
-def as_it_stands(found: Characteristics, control: Control) -> Table:
-    """Return the extremes of records that are none of these tests."""
-    return Table(
-        "Records that are none of these tests, as they stand: extremes of all samples",
-        (
-            *conditions(control),
-            Column("force_N", "force", "N", lambda r: Span(r.compression_force_N, r.rebound_force_N)),
-            Column(
-                "velocity_m_per_s",
-                "velocity",
-                "m/s",
-                lambda row: Span(row.compression_velocity_m_per_s, row.rebound_velocity_m_per_s),
-            ),
-            Column("stroke_m", "stroke", "mm", factor=1000.0),
-            Column("duration_s", "duration", "s"),
-            Column("record", "record"),
-        ),
-        found.as_it_stands,
-        FOLD,
-    )
 
 
 # --- identify: the knee law, in the language of the trade ---
@@ -208,7 +187,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
     directions = found.directions()
     of_direction = (*conditions(control, lambda each: each.row), Column("direction", "direction"))
     yield Table(
-        "Law of the element handed on",
+        "Adopted law of the element",
         (Column("setting", "setting", optional=True), Column("law", "law"), Column("reason", "reason")),
         found.laws,
     )
@@ -272,7 +251,7 @@ def knee_prediction(found: Knees, control: Control) -> Table:
     return Table(
         "Tests predicted by both laws, each fitted without them",
         (
-            Column("record", "test kept back"),
+            Column("record", "held-out test"),
             *conditions(control),
             Column("W_s_bingham", "W_s by one T0 and C"),
             Column("W_s_knee", "W_s by the knee law"),
@@ -311,12 +290,12 @@ def prediction(found: Prediction, control: Control) -> Table:
     tests = [each.model_dump() for each in found.by]
     voltages = [{"record": "all tests, left out", **each.model_dump()} for each in found.left_out_voltages]
     return Table(
-        f"What was kept back from the fit ({how}), and how it is predicted",
+        f"Prediction of held-out data ({how}) by a fit to the others",
         (
-            Column("record", "kept back", value=lambda row: row["record"]),
+            Column("record", "held out", value=lambda row: row["record"]),
             signal(control, lambda row: row["voltage"]),
             Column("W_s_plain", "W_s, simple model", value=lambda row: row["W_s_plain"]),
-            Column("W_s", "W_s, as handed on", value=lambda row: row["W_s"]),
+            Column("W_s", "W_s, adopted damper", value=lambda row: row["W_s"]),
         ),
         [whole, *tests, *voltages],
         fold=7,  # the row of all and six tests

@@ -31,13 +31,13 @@ from pzd.artefacts import (
     RideRow,
     Rides,
     Rig,
-    StepRow,
     SummaryRow,
     Table,
     TableNotes,
     Value,
     WheelRow,
 )
+from pzd.artefacts.identified import StepRow
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion

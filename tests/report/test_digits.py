@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
+from pzd.artefacts import Characteristics, Gap, Identified, ParameterRow
+from pzd.artefacts.identified import GasAndFrictionRow, PeakVelocityRow
 from pzd.cli.look import diagnosis_lines
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.verdict import weak
+from pzd.diagnosis.verdict import hold_out_note
 from pzd.force_table.force import lost, not_monotone
 from pzd.quantities import Control
 from pzd.report import tables
@@ -81,16 +82,16 @@ def static(gas: float) -> Characteristics:
 def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
     gas: float, printed: tuple[str, str], drawn: tuple[str, str]
 ) -> None:
-    table = tables.gas_and_friction(static(gas), Control())
+    *_, table = tables.characteristics(static(gas), Control())
     assert table.cells(TERMINAL)[1][:2] == printed
     assert tuple(cell.replace("\xa0N", "") for cell in table.cells(PAGE)[1][:2]) == drawn
 
 
 def test_weak_evidence_says_what_was_held_out() -> None:
-    assert weak("records") == ""
-    assert "held out were cycles of tests that were also fitted" in weak("cycles")
-    assert "mixed" not in weak("mixed")
-    assert "held out were some whole tests, and parts of tests" in weak("mixed")
+    assert hold_out_note("records") == ""
+    assert "held out were cycles of tests that were also fitted" in hold_out_note("cycles")
+    assert "mixed" not in hold_out_note("mixed")
+    assert "held out were some whole tests, and parts of tests" in hold_out_note("mixed")
 
 
 @pytest.mark.parametrize(

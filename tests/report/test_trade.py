@@ -9,17 +9,8 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import (
-    AsItStandsRow,
-    Characteristics,
-    ClickRow,
-    KneeForceRow,
-    KneeRow,
-    Knees,
-    LawRow,
-    PredictedRow,
-    UnitRow,
-)
+from pzd.artefacts import Characteristics, ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
+from pzd.artefacts.identified import AsItStandsRow
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.report import tables
@@ -140,7 +131,7 @@ def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_directi
     ):
         assert cell in page
     assert "21.5" in page
-    assert "Law of the element handed on" in page
+    assert "Adopted law of the element" in page
 
 
 def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> None:
