@@ -115,29 +115,17 @@ def on_config(*asked: str) -> Callable[[Callable[..., int]], Callable[..., int]]
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
 
         @wraps(function)
-        def command(
-            *,
-            config: Path,
-            runs: Path,
-            overrides: list[str] | None,
-            quiet: bool,
-            verbose: bool,
-            as_json: bool = False,
-            **others: Any,
-        ) -> int:
-            of_call = {name: others.pop(name) for name in ("force", "jobs") if name in others}
+        def command(*, quiet: bool, verbose: bool, as_json: bool = False, **given: Any) -> int:
+            its_own = {option.name: given.pop(option.name) for option in own}
+            given["overrides"] = tuple(given["overrides"] or ())
             output = Output(quiet=quiet, verbose=verbose, as_json=as_json)
-            return function(Call(config, runs, tuple(overrides or ()), output, **of_call), **others)
+            return function(Call(output=output, **given), **its_own)
 
-        shared = {name: given for name, given in _SHARED.items() if name not in _OF_SOME or name in asked}
-        options = [
-            inspect.Parameter("config", inspect.Parameter.KEYWORD_ONLY, annotation=Config),
-            *(option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in own),
-            *(
-                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
-                for name, (annotation, default) in shared.items()
-            ),
-        ]
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        options = [inspect.Parameter("config", keyword, annotation=Config), *(one.replace(kind=keyword) for one in own)]
+        for name, (annotation, default) in _SHARED.items():
+            if name not in _OF_SOME or name in asked:
+                options.append(inspect.Parameter(name, keyword, annotation=annotation, default=default))
         command.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]  # typer reads the options off it
         return command
 

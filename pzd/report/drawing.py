@@ -14,7 +14,7 @@ import numpy as np
 from pzd.artefacts import SummaryRow
 from pzd.parallel.processes import parallel_map
 from pzd.record import Array
-from pzd.report.blocks import Picture
+from pzd.report.blocks import Picture, Pictures
 from pzd.report.context import ReportContext
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Place = Literal["characteristics", "model", "missing", "damper", "passenger", "policies"]
 """Where on the page a plot stands."""
-PLACES: tuple[Place, ...] = get_args(Place)
 
 MEASURED = "#4d4d4d"
 BASELINE = "#d55e00"
@@ -160,14 +159,15 @@ def styled() -> Iterator[None]:
         yield
 
 
-def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
+def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> Pictures:
     """Draw and encode the panels of each plot, `jobs` plots at the same time."""
 
-    def drawn(plot: Plot) -> tuple[Picture, ...]:
-        return tuple(encoded(panel) for panel in plot.draw(context))
+    def drawn(plot: Plot) -> tuple[Place, tuple[Picture, ...]]:
+        return plot.place, tuple(encoded(panel) for panel in plot.draw(context))
 
     with styled():
-        return parallel_map(drawn, plots, jobs)
+        found = parallel_map(drawn, plots, jobs)
+    return {place: tuple(panels for where, panels in found if where == place) for place in get_args(Place)}
 
 
 def encoded(panel: Panel) -> Picture:

@@ -64,7 +64,8 @@ def report(
     reference = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     used = setting_in_use(identified, setting)
     tests = RigTests(rig, identified, control, used, config.records_shown)
-    dampers, rides_rated = DamperModels.of(identified, diagnosed, used), RatedRides(ratings, comfort, simulate, control)
+    dampers = DamperModels(diagnosed, tuple(row for row in identified.rows if row.setting == used))
+    rides_rated = RatedRides(ratings, comfort, simulate, control)
     artefacts = (rig, identified, diagnosed, table, rides)
     context = ReportContext(config, simulate, *artefacts, control, used, tests, dampers, rides_rated, reference)
     return Report(comfort=comfort, page=page(context, jobs), reference=reference)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from pzd.artefacts import (
@@ -15,10 +15,9 @@ from pzd.artefacts import (
     SettingLeftOutRow,
     SettingRow,
     SummaryRow,
-    Value,
 )
 from pzd.artefacts.csv_rows import Estimate
-from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow
 from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
 from pzd.artefacts.knee import DIRECTIONS
 from pzd.artefacts.rig import slowest_test_force
@@ -308,7 +307,7 @@ def effect_parameters(diagnosis: Diagnosis, control: Control) -> Table:
         (effect, _counted_from(diagnosis, effect, name), voltage, estimate, value.unit)
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
-        for voltage, estimate in zip(_voltages(value), value.estimates, strict=True)
+        for voltage, estimate in zip(value.at_voltage_V or (None,) * len(value.estimates), value.estimates, strict=True)
     ]
     return Table(
         "What was added",
@@ -328,10 +327,6 @@ def _counted_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
     return f"{name} to either side of x = {1000.0 * diagnosis.zero_m:.3g} mm" if is_place else name
 
 
-def _voltages(value: Value) -> Sequence[float | None]:
-    return value.at_voltage_V or (None,) * len(value.estimates)
-
-
 def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
     """Yield the tables of the comparison with published models, the models side by side: those that have rows."""
     held_out = [row for row in found.rows if row.kept_back == "test"]
@@ -348,9 +343,11 @@ def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
         *(_of_model("W_s", model) for model in found.models),
         *(_of_model("R2", model, decimals=4) for model in found.models),  # four places tell 0.994 from 0.996
     )
+    count = len(found.models)
     for title, rows in parts.items():
-        if rows:
-            yield Table(title, columns, _side_by_side(rows, len(found.models)))
+        if rows:  # those of a test stand together, one for each model
+            tests = [{row.model: row for row in rows[first : first + count]} for first in range(0, len(rows), count)]
+            yield Table(title, columns, tests)
     yield _peer_parameters(found.parameters, control)
 
 
@@ -360,13 +357,12 @@ def _of_model(name: str, model: str, decimals: int | None = None) -> Column:
     )
 
 
-def _side_by_side(rows: Sequence[PeerRow], models: int) -> list[Mapping[str, PeerRow]]:
-    """Return one mapping from model to row for each test; the rows of a test stand together."""
-    return [{row.model: row for row in rows[first : first + models]} for first in range(0, len(rows), models)]
-
-
 def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Table:
     """Return the parameters of published models, a line for each model and control value."""
+
+    def assignment(row: PeerParameterRow) -> str:
+        return f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}"
+
     fits: dict[tuple[Any, ...], list[PeerParameterRow]] = {}
     for row in rows:
         fits.setdefault((row.setting, row.voltage_V, row.model, row.form, row.status), []).append(row)
@@ -375,15 +371,11 @@ def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Tabl
         (
             *conditions(control, lambda fit: fit[0])[:2],
             Column("model", "model", value=lambda fit: ", ".join(filter(None, (fit[0].model, fit[0].form)))),
-            Column("parameters", "parameters", value=lambda fit: ", ".join(map(_assignment, fit))),
+            Column("parameters", "parameters", value=lambda fit: ", ".join(map(assignment, fit))),
             Column("status", "fit", value=lambda fit: fit[0].status),
         ),
         list(fits.values()),
     )
-
-
-def _assignment(row: PeerParameterRow) -> str:
-    return f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}"
 
 
 # --- table: settings between tested ones ---

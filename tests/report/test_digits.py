@@ -112,7 +112,7 @@ def test_the_line_on_the_gap_says_of_how_many_records_something_was_held_out(kin
 def test_the_words_for_a_sensor_delay_leave_open_which_channel_is_late() -> None:
     words = effect_in_words("sensor_delay")
     assert "late" not in words
-    assert "different instants" in words
+    assert "in one of the channels" in words
 
 
 def test_notes_of_the_force_table_name_the_control_of_the_config() -> None:

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
@@ -90,7 +91,7 @@ def read(page: str) -> Reader:
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """No pictures: for what the text alone must say."""
-    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
 
 
 def test_sections_stand_in_the_order_of_the_stages_and_every_tag_is_closed(read: Reader) -> None:
@@ -229,7 +230,7 @@ def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None
 
 
 def test_the_final_damper_s_parameters_stand_first_with_intervals_and_the_simple_model_s_behind(read: Reader) -> None:
-    _, _, final = read.text.partition("T0, C and k beside what was missing")
+    _, _, final = read.text.partition("T0, C and k of the adopted damper")
     final, _, simple = final.partition("The simple model: T0, C and k of the Bingham element alone")
     assert "474 (469 to 480)" in final
     assert "ok" in final
@@ -460,7 +461,7 @@ def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypat
     curves = []
     monkeypatch.setattr(
         "pzd.report.page.pictures",
-        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or [()] * len(plots),
+        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or defaultdict(tuple),
     )
     for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
         replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()

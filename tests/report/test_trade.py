@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -108,7 +109,7 @@ def with_knee(run: Any) -> Any:
 def words_only() -> Iterator[None]:
     """No pictures, which take most of the time of a page: all claims here are about its text."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
         yield
 
 

@@ -61,7 +61,7 @@ def _knee_blocks(context: ReportContext) -> Iterator[Block]:
 def _parameters(context: ReportContext) -> TextTable:
     """Return T0, C and k of the damper that everything behind uses."""
     title = (
-        "T0, C and k beside what was missing" if context.damper.extended else "T0, C and k of the Bingham element alone"
+        "T0, C and k of the adopted damper" if context.damper.extended else "T0, C and k of the Bingham element alone"
     )
     title = "T0, C and k beside the knee, C the mean bleed of both directions" if context.damper.fitted_law else title
     return tables.parameters(context.damper.final_parameters, context.control, title).without("setting").block()

@@ -168,8 +168,8 @@ def _compared(context: ReportContext) -> Iterator[Block]:
         return
     policy = pairs[0][0].policy
     yield Paragraph(
-        f"The policy {policy} is set beside the others on the same road and at the same fidelity. What the best of "
-        "the others hold was searched for on each road and at each fidelity, so that a_w is least."
+        f"The policy {policy} is compared with the others on the same road and at the same fidelity. What the "
+        "best of the others hold constant was searched for on each road and at each fidelity, for the least a_w."
     )
 
     def changed(name: str, head: str, value: Callable[[SummaryRow], float]) -> Column:
@@ -361,7 +361,7 @@ def _modes(context: ReportContext) -> TextTable:
     """Return the modes of the car on dampers of the constant c."""
     c = context.simulate.constant_damping_Ns_per_m
     return Table(
-        f"How the car swings by itself, with c = {amount(c, 'N s/m')} at each axle and the wheels on the road",
+        f"Modes of the car, with c = {amount(c, 'N s/m')} at each axle and the wheels on the road",
         (
             Column("name", "motion"),
             Column("frequency_Hz", "undamped frequency", "Hz"),
