@@ -215,8 +215,8 @@ def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
         yield "verdict", run.diagnosis.verdict
         yield "effects", ", ".join(run.diagnosis.effects) or "-"
         yield "confidence", _number(run.diagnosis.confidence)
-        yield "gap before", _number(run.diagnosis.gap.before if run.diagnosis.gap else None)
-        yield "gap after", _number(run.diagnosis.gap.after if run.diagnosis.gap else None)
+        yield "W_s on held-out data, baseline", _number(run.diagnosis.gap.before if run.diagnosis.gap else None)
+        yield "W_s on held-out data, adopted damper", _number(run.diagnosis.gap.after if run.diagnosis.gap else None)
     for ride in run.summary:
         yield f"{ride.case}: peak |a_K| at {ride.point} [m/s2]", _number(ride.peak_abs_aK_m_per_s2)
         yield f"{ride.case}: rms a_K at {ride.point} [m/s2]", _number(ride.rms_aK_m_per_s2)

@@ -399,13 +399,13 @@ def interpolated_settings(rows: Sequence[SettingRow], control: Control) -> Table
 def left_out_settings(rows: Sequence[SettingLeftOutRow]) -> Table:
     """Return how well tested settings are predicted from their neighbours."""
     return Table(
-        "Tested settings predicted from their neighbours, missed in % of peak force",
+        "Tested settings predicted from their neighbours, with the error in % of peak force",
         (
             Column("setting", "left out"),
             Column("between", "predicted from", value=_neighbours),
             Column("peak_force_N", "its peak force", "N"),
-            share("rms_share_of_peak", "missed by (r.m.s.)"),
-            share("largest_share_of_peak", "at most"),
+            share("rms_share_of_peak", "error (r.m.s.)"),
+            share("largest_share_of_peak", "largest error"),
         ),
         rows,
     )

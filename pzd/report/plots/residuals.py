@@ -59,8 +59,8 @@ def hypothesis(context: ReportContext) -> Iterator[Panel]:
         f"{number(peak.value)} {first.unit}."
     )
     caption = (
-        "Dots: mean and standard deviation of samples of one class, less what T0, C, k, the effects adopted and each "
-        "test's own offset, gain and delay take up. Line: the hypothesis, which is adopted nowhere."
+        "Dots: mean and standard deviation of the samples of one class, with T0, C, k, the adopted effects and each "
+        "test's own offset, gain and delay projected out. Line: the hypothesis, which is adopted nowhere."
     )
     yield Panel(figure, f"Hypothesis: what is left, as c {first.shape}", alt, caption)
 
@@ -254,7 +254,7 @@ def normal_quantiles(context: ReportContext) -> Iterator[Panel]:
     ends = f"from {number(found[0])} to {number(found[-1])}"
     alt = f"Quantiles of measured minus simulated force against a normal distribution: {ends}."
     caption = (
-        "On the dashed line it is spread as chance spreads it; long ends are rare large misses, as jumps leave them."
+        "On the dashed line the residual is normally distributed; long ends are rare large residuals, as jumps leave."
     )
     yield Panel(figure, "How what is left is spread", alt, caption)
 

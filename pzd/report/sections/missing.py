@@ -51,10 +51,10 @@ def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
 
 def _gap(gap: Gap | None) -> str:
     if gap is None:
-        return "How far it misses the measured force could not be measured."
+        return "Its error on data that no fit has seen could not be measured."
     return (
         f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
-        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the model misses "
+        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the residual is "
         f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
     )
 
