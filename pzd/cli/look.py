@@ -340,10 +340,11 @@ def _value(value: Value, unit: str) -> str:
     edited = " (edited by hand)" if value.low95 is None and value.high95 is None else ""
     if value.at_voltage_V is not None:
         pairs = zip(value.estimates, value.at_voltage_V, strict=True)
-        return "; ".join(f"{_number(one.value)} {value.unit} at {_number(at, unit)}" for one, at in pairs) + edited
+        return "; ".join(f"{_number(one.value, value.unit)} at {_number(at, unit)}" for one, at in pairs) + edited
     (estimate,) = value.estimates
-    text = _number(estimate.value) if estimate.interval is None else TERMINAL.interval(estimate)
-    return f"{text} {value.unit}{edited}"
+    if estimate.interval is None:
+        return f"{_number(estimate.value, value.unit)}{edited}"
+    return f"{TERMINAL.text(estimate, value.unit)}{edited}"
 
 
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
@@ -374,9 +375,10 @@ def _shape(row: HypothesisRow) -> str:
 
     more = f" and {_number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
     value = TERMINAL.interval(Estimate.of(row, "coefficient"))
-    at = f", {row.parameter} = {_number(row.parameter_value)} {row.parameter_unit}" if row.parameter else ""
+    at = f", {row.parameter} = {_number(row.parameter_value, row.parameter_unit or '')}" if row.parameter else ""
     closes = f"would close {row.closes:.0%} of the gap on tests kept back"
-    return f"c {row.shape}, c = {value}{more} {row.unit}{at}: {closes}"
+    unit = "" if row.unit == "-" else f" {row.unit}"
+    return f"c {row.shape}, c = {value}{more}{unit}{at}: {closes}"
 
 
 def _physics(row: HypothesisRow) -> str:
