@@ -21,22 +21,15 @@ from pzd.artefacts.diagnosis import (
     Value,
 )
 from pzd.artefacts.identified import (
-    FALLBACK,
-    AsItStandsRow,
     AuxiliaryRow,
     Characteristics,
-    ContinuousVelocityRow,
-    GasAndFrictionRow,
     Identified,
     MeasureRow,
     ParameterRow,
-    PeakVelocityRow,
-    StepRow,
-    WarmUpRow,
     base_of,
     identified_damper,
 )
-from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow, knee_damper
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
 from pzd.artefacts.report import ComfortRow, Manifest, ReferenceRow, Report
 from pzd.artefacts.rides import (
     AXLE_COLUMNS,

@@ -367,7 +367,5 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
         return min(known)[1] if known else FALLBACK[name]
 
     return BaseRow(
-        voltage_V=row.voltage_V,
-        temperature_degC=row.temperature_degC,
-        **{name: value(name) for name in FALLBACK},
+        voltage_V=row.voltage_V, temperature_degC=row.temperature_degC, **{name: value(name) for name in FALLBACK}
     )

@@ -242,11 +242,15 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     rows : of one setting, at least one
     """
     displacement_zero = float(np.mean([row.zero_m for row in rows]))
+
+    def gas_force(row: KneeRow) -> float:
+        return row.gas_force_N + row.gas_spring_N_per_m * (displacement_zero - row.zero_m)
+
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: -np.inf if v is None else v)
     parts = [[row for row in rows if row.voltage_V == voltage] for voltage in voltages]
     effects = {
         "knee": [_mean([_knee(row) for row in part]) for part in parts],
-        "preload_offset": [_mean([{"F_0": _gas_force(row, displacement_zero)} for row in part]) for part in parts],
+        "preload_offset": [_mean([{"F_0": gas_force(row)} for row in part]) for part in parts],
         "gas_spring": [_mean([{"k_g": row.gas_spring_N_per_m} for row in part]) for part in parts],
     }
     shown = {
@@ -281,11 +285,6 @@ def _knee(row: KneeRow) -> dict[str, float]:
         "F_comp": NO_KNEE if row.compression_knee_force_N is None else row.compression_knee_force_N,
         "C_comp": compression if row.compression_blow_off_Ns_per_m is None else row.compression_blow_off_Ns_per_m,
     }
-
-
-def _gas_force(row: KneeRow, displacement_zero: float) -> float:
-    """Return F_0 at another zero of the displacement [N]."""
-    return row.gas_force_N + row.gas_spring_N_per_m * (displacement_zero - row.zero_m)
 
 
 def _mean(values: Sequence[dict[str, float]]) -> dict[str, float]:

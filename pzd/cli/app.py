@@ -34,14 +34,8 @@ app = typer.Typer(
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: tuple[Callable[..., int], ...] = (
-    *stages.COMMANDS,
-    *peers.COMMANDS,
-    *look.COMMANDS,
-    *export.COMMANDS,
-    *campaigns.COMMANDS,
-    *start.COMMANDS,
-)
+_MODULES = (stages, peers, look, export, campaigns, start)
+_COMMANDS: tuple[Callable[..., int], ...] = tuple(command for module in _MODULES for command in module.COMMANDS)
 for _command in _COMMANDS:
     app.command()(_command)
 

@@ -7,20 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pzd.cli.output import (
-    CORES,
-    DONE,
-    RUNS,
-    Config,
-    Force,
-    Jobs,
-    Output,
-    Quiet,
-    Runs,
-    Set,
-    Verbose,
-    exit_code,
-)
+from pzd.cli.options import Call, on_config
+from pzd.cli.output import DONE, exit_code
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,38 +23,28 @@ if TYPE_CHECKING:
 Status = Annotated[bool, typer.Option("--status", help="Print how far it is, and run nothing.")]
 
 
-def sweep(
-    config: Config,
-    status: Status = False,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    force: Force = False,
-    jobs: Jobs = CORES,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("force", "jobs")
+def sweep(call: Call, status: Status = False) -> int:
     """Run every combination of values and every random draw of the block `sweep`, and say what decides.
 
     What is finished stays: a sweep that was stopped goes on where it was.
     """
-    from pzd.pipeline.command import execute, opened
     from pzd.sweep.campaign import SweepRuns
     from pzd.sweep.task import BaseRun
 
-    output = Output(quiet=quiet, verbose=verbose)
-    given = opened(config, runs, overrides or ())
-    campaign = SweepRuns.of(BaseRun(config, runs, tuple(overrides or ())), output.progress)
+    given, output = call.opened, call.output
+    campaign = SweepRuns.of(BaseRun(call.config, call.runs, call.overrides), output.progress)
     if status:
         output.say(*_status(campaign))
         return DONE
     with given.placed():
         shared = campaign.last_shared_stage()
-    marks = execute(given, shared, force=False, jobs=jobs, say=output.say, progress=output.progress) if shared else ()
+    marks = call.execute(shared) if shared else ()
     with given.run.locked("pzd sweep"), given.placed():
         if shared in ("diagnose", "table"):
             campaign.check()
-        found = campaign.run(jobs, afresh=force)
-        output.say(*campaign.gather(found, config.stem))
+        found = campaign.run(call.jobs, afresh=call.force)
+        output.say(*campaign.gather(found, call.config.stem))
     failed = sum(outcome.failure is not None for outcome in found)
     return exit_code([*marks, *([f"{failed} of {len(found)} runs came to no result"] if failed else [])])
 
@@ -88,35 +66,26 @@ FOLDER = "blind"
 """Where the benchmark lies beside the stages of the run."""
 
 
-def blind(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    force: Force = False,
-    jobs: Jobs = CORES,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("force", "jobs")
+def blind(call: Call) -> int:
     """Hide effects in virtual rigs, diagnose them, score the verdicts."""
     from pzd.blind.benchmark import Benchmark, Methods, folder_of
     from pzd.blind.summary import write
     from pzd.parallel.engines import Where
-    from pzd.pipeline.command import opened
 
-    output = Output(quiet=quiet, verbose=verbose)
-    given = opened(config, runs, overrides or ())
+    given, base = call.opened, call.config.parent
     setup, whole = _setup(given.config), given.config
     places = folder_of(given.run.folder / FOLDER, setup.blind)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
         made_from = _made_from(whole)
         with given.placed():
-            _entered(setup.blind, made_from, config.parent)
-        where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
-        benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
-        cases = benchmark.run(jobs, afresh=force)
+            _entered(setup.blind, made_from, base)
+        where = Where(setup.blind, FOLDER, base, places.folder / "slurm")
+        benchmark = Benchmark(setup, methods, places, made_from, where, call.output.progress)
+        cases = benchmark.run(call.jobs, afresh=call.force)
         lines = write(cases, places.folder, setup.control, setup.blind)
-    output.say(*lines, f"tables and picture: {places.folder}")
+    call.output.say(*lines, f"tables and picture: {places.folder}")
     return exit_code(f"case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
 
 

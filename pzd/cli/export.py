@@ -8,19 +8,8 @@ from typing import Annotated
 
 import typer
 
-from pzd.cli.output import (
-    RUNS,
-    Config,
-    Jobs,
-    Json,
-    Output,
-    Quiet,
-    Runs,
-    Set,
-    Verbose,
-    command_line,
-    exit_code,
-)
+from pzd.cli.options import Call, on_config
+from pzd.cli.output import exit_code
 from pzd.export.formats import formats
 
 
@@ -52,52 +41,31 @@ Out = Annotated[
 ]
 
 
-def export(
-    config: Config,
-    to: To,
-    out: Out = None,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("as_json")
+def export(call: Call, to: To, out: Out = None) -> int:
     """Write the damper of a run in the form that another tool takes."""
-    from pzd.pipeline.command import opened
     from pzd.pipeline.exporting import LAST, exported
 
-    output = Output(quiet=quiet, verbose=verbose)
-    remedy = command_line(LAST, config, runs, overrides or ())
     (form,) = to
-    written = exported(opened(config, runs, overrides or ()), form, out, remedy)
-    if as_json:
+    written = exported(call.opened, form, out, call.command_line(LAST))
+    if call.output.as_json:
         files = [path.as_posix() for path in written.files]
-        output.say_json({"format": form, "files": files, "not_to_be_trusted": written.marks})
-    else:
-        output.say(*(f"export: {path}" for path in written.files))
+        call.output.say_json({"format": form, "files": files, "not_to_be_trusted": written.marks})
+    call.output.say(*(f"export: {path}" for path in written.files))
     return exit_code(written.marks)
 
 
-def figures(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    jobs: Jobs = 1,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("jobs")
+def figures(call: Call) -> int:
     """Draw the figures of the paper, and their index."""
     from pzd.paper.figures.draw import FOLDER, drawn
     from pzd.paper.figures.sources import FigureData
-    from pzd.pipeline.command import execute, opened
 
-    output = Output(quiet=quiet, verbose=verbose)
-    given = opened(config, runs, overrides or ())
-    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say, progress=output.progress)
-    figure_set = drawn(FigureData.of(given.run, given.config), output.say)
-    with given.run.locked("pzd figures"):
-        given.run.write_extra(FOLDER, figure_set.write)
-    output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
+    marks, run = call.execute("identify"), call.opened.run
+    figure_set = drawn(FigureData.of(run, call.opened.config), call.output.say)
+    with run.locked("pzd figures"):
+        run.write_extra(FOLDER, figure_set.write)
+    call.output.say(f"figures: {run.folder / FOLDER / 'index.html'}")
     return exit_code(marks)
 
 

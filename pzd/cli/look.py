@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.cli.output import CORES, DONE, RUNS, Config, Json, Output, Quiet, Runs, Set, Verbose
+from pzd.cli.options import CORES, Call, Json, Quiet, Verbose, on_config
+from pzd.cli.output import DONE, Output
 from pzd.schema.errors import ConfigError, counted
 
 if TYPE_CHECKING:
@@ -60,38 +61,28 @@ def _number(value: float | None, unit: str = "") -> str:
 # --- pzd check ---
 
 
-def check(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    plot: PlotFile = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("as_json")
+def check(call: Call, plot: PlotFile = None) -> int:
     """Check config, rig records and road files; write nothing but the page of --plot."""
-    from pzd.pipeline.command import check_roads, check_setting, opened, preflight
+    from pzd.pipeline.command import check_roads, check_setting, preflight
     from pzd.schema.validate import plain_data
 
-    output = Output(quiet=quiet, verbose=verbose)
-    given = opened(config, runs, overrides or ())
+    given, output = call.opened, call.output
     _check_plot(plot)
     rig = preflight(given)
     if plot is not None:
         from pzd.report.recorded import records_page
 
         plot.write_text(records_page(rig, given.run.control, CORES), encoding="utf-8", newline="\n")
-    if as_json:
-        output.say_json(plain_data({"config": config.as_posix(), "records": rig.entries}, given.run.control))
-    else:
-        for entry in rig.entries:
-            output.say(*_entry(entry), *(_ingested(rig.ingested, entry.name) if verbose else ()))
+    if output.as_json:
+        output.say_json(plain_data({"config": call.config.as_posix(), "records": rig.entries}, given.run.control))
+    for entry in rig.entries:
+        output.say(*_entry(entry), *(_ingested(rig.ingested, entry.name) if output.verbose else ()))
     check_setting(given, rig.entries)
     check_roads(given)
-    if not as_json:
-        found = counted(sum(len(entry.findings) for entry in rig.entries), "finding")
-        wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
-        output.say(f"{counted(len(rig.entries), 'record')}, {found}; the config is in order, {wrote}")
+    found = counted(sum(len(entry.findings) for entry in rig.entries), "finding")
+    wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
+    output.say(f"{counted(len(rig.entries), 'record')}, {found}; the config is in order, {wrote}")
     return DONE
 
 
@@ -120,29 +111,21 @@ def _ingested(rows: Sequence[IngestRow], record: str) -> Iterator[str]:
 # --- pzd show ---
 
 
-def show(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    resolved: IsResolved = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("as_json")
+def show(call: Call, resolved: IsResolved = False) -> int:
     """Print the numbers in the run of a config.
 
     A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
     """
-    output = Output(quiet=quiet, verbose=verbose)
+    output = call.output
     if resolved:
-        return _show_resolved(config, runs, overrides or (), output, as_json=as_json)
-    from pzd.pipeline.command import opened
+        _show_resolved(call)
+        return DONE
     from pzd.pipeline.run_summary import summary_with_stale
 
-    found = summary_with_stale(opened(config, runs, overrides or ()))
-    if as_json:
+    found = summary_with_stale(call.opened)
+    if output.as_json:
         output.say_json(_run_as_data(found))
-        return DONE
     output.say(f"run: {found.folder}", *_stale_lines(found))
     for title, lines in _sections(found):
         if lines:
@@ -175,19 +158,17 @@ def _titled(table: Table) -> tuple[str, list[str]]:
     return f"{table.title[0].lower()}{table.title[1:]}", table.lines("  ")
 
 
-def _show_resolved(config: Path, runs: Path, overrides: Sequence[str], output: Output, *, as_json: bool) -> int:
+def _show_resolved(call: Call) -> None:
     """Print every value of the config with its origin; nothing needs to have run."""
-    from pzd.pipeline.command import opened, resolved
+    from pzd.pipeline.command import resolved
     from pzd.report.columns import aligned
     from pzd.schema.yamltree import written
 
-    found = resolved(opened(config, runs, overrides))
-    if as_json:
-        output.say_json([vars(one) for one in found])
-        return DONE
+    found = resolved(call.opened)
+    if call.output.as_json:
+        call.output.say_json([vars(one) for one in found])
     values = ["[]" if one.value == [] else "{}" if one.value == {} else written(one.value) for one in found]
-    output.say(*aligned([[one.path, value, one.origin] for one, value in zip(found, values, strict=True)]))
-    return DONE
+    call.output.say(*aligned([[one.path, value, one.origin] for one, value in zip(found, values, strict=True)]))
 
 
 def _stale_lines(found: RunSummary, place: str = "") -> list[str]:
@@ -206,11 +187,10 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
     from pzd.pipeline.run_summary import summary_of
     from pzd.report.columns import aligned
 
-    output = Output(quiet=quiet, verbose=verbose)
+    output = Output(quiet=quiet, verbose=verbose, as_json=as_json)
     found = [summary_of(folder) for folder in runs]
     if as_json:
         output.say_json([_run_as_data(run) for run in found])
-        return DONE
     columns = [dict(_numbers(run)) for run in found]
     names = dict.fromkeys(name for column in columns for name in column)
     head = ["", *(str(run.folder) for run in found)]
@@ -235,8 +215,8 @@ def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
         yield "verdict", run.diagnosis.verdict
         yield "effects", ", ".join(run.diagnosis.effects) or "-"
         yield "confidence", _number(run.diagnosis.confidence)
-        yield "gap before", _number(run.diagnosis.gap.before if run.diagnosis.gap else None)
-        yield "gap after", _number(run.diagnosis.gap.after if run.diagnosis.gap else None)
+        yield "W_s on held-out data, baseline", _number(run.diagnosis.gap.before if run.diagnosis.gap else None)
+        yield "W_s on held-out data, adopted damper", _number(run.diagnosis.gap.after if run.diagnosis.gap else None)
     for ride in run.summary:
         yield f"{ride.case}: peak |a_K| at {ride.point} [m/s2]", _number(ride.peak_abs_aK_m_per_s2)
         yield f"{ride.case}: rms a_K at {ride.point} [m/s2]", _number(ride.rms_aK_m_per_s2)
@@ -360,10 +340,11 @@ def _value(value: Value, unit: str) -> str:
     edited = " (edited by hand)" if value.low95 is None and value.high95 is None else ""
     if value.at_voltage_V is not None:
         pairs = zip(value.estimates, value.at_voltage_V, strict=True)
-        return "; ".join(f"{_number(one.value)} {value.unit} at {_number(at, unit)}" for one, at in pairs) + edited
+        return "; ".join(f"{_number(one.value, value.unit)} at {_number(at, unit)}" for one, at in pairs) + edited
     (estimate,) = value.estimates
-    text = _number(estimate.value) if estimate.interval is None else TERMINAL.interval(estimate)
-    return f"{text} {value.unit}{edited}"
+    if estimate.interval is None:
+        return f"{_number(estimate.value, value.unit)}{edited}"
+    return f"{TERMINAL.text(estimate, value.unit)}{edited}"
 
 
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
@@ -394,9 +375,10 @@ def _shape(row: HypothesisRow) -> str:
 
     more = f" and {_number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
     value = TERMINAL.interval(Estimate.of(row, "coefficient"))
-    at = f", {row.parameter} = {_number(row.parameter_value)} {row.parameter_unit}" if row.parameter else ""
+    at = f", {row.parameter} = {_number(row.parameter_value, row.parameter_unit or '')}" if row.parameter else ""
     closes = f"would close {row.closes:.0%} of the gap on tests kept back"
-    return f"c {row.shape}, c = {value}{more} {row.unit}{at}: {closes}"
+    unit = "" if row.unit == "-" else f" {row.unit}"
+    return f"c {row.shape}, c = {value}{more}{unit}{at}: {closes}"
 
 
 def _physics(row: HypothesisRow) -> str:

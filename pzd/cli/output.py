@@ -1,19 +1,16 @@
-"""What the command line prints: lines to stdout, complaints to stderr, progress to a terminal; and shared options."""
+"""What the command line prints: lines or JSON to stdout, complaints to stderr, progress to a terminal."""
 
 from __future__ import annotations
 
 import logging
 import os
-import shlex
 import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
-
-import typer
+from typing import TYPE_CHECKING, Any, TextIO
 
 # --- Exit codes other than those of errors of the user, which stand with these errors ---
 
@@ -30,10 +27,11 @@ _BAR = 24
 
 
 class Output:
-    """Prints as much as the user wants to see."""
+    """Prints as much as the user wants to see: lines, or with `--json` nothing on stdout but one JSON document."""
 
-    def __init__(self, *, quiet: bool, verbose: bool) -> None:
-        self.quiet, self.verbose = quiet, verbose and not quiet
+    def __init__(self, *, verbose: bool, quiet: bool = False, as_json: bool = False) -> None:
+        self.as_json, self.silent = as_json, quiet
+        self.quiet, self.verbose = quiet or as_json, verbose and not quiet and not as_json
         logger = logging.getLogger("pzd")
         handler = _Handler(self)
         logger.handlers = [handler]
@@ -42,7 +40,7 @@ class Output:
         logging.getLogger("py.warnings").handlers = [handler if verbose else logging.NullHandler()]
 
     def say(self, *lines: str) -> None:
-        """Print lines to stdout, unless the user wants it quiet or nobody listens any more."""
+        """Print lines to stdout, unless the user wants none or nobody listens any more."""
         if not self.quiet:
             clear_progress()
             for line in lines:
@@ -52,7 +50,8 @@ class Output:
         """Print plain data as JSON to stdout."""
         from pzd.schema.validate import json_text
 
-        self.say(json_text(data))
+        if not self.silent:
+            _print(json_text(data), sys.stdout)
 
     def progress(self, event: Progress) -> None:
         """Show how far a stage has come: a line each where the user wants to see all, else a bar on a terminal."""
@@ -137,50 +136,3 @@ def _filed(text: str) -> str:
     except OSError as error:
         return f"the traceback could not be written: {error.strerror}; -v shows it"
     return f"traceback in {Path(name)}; -v shows it"
-
-
-# --- Options that commands share, each with its help ---
-
-Config = Annotated[
-    Path, typer.Argument(metavar="CONFIG", help="The YAML file that describes the run.", show_default=False)
-]
-Runs = Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of the results.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="a.b=VALUE",
-        help="Set a value of the config, items of lists by index; can be given again.",
-        show_default=False,
-    ),
-]
-Force = Annotated[bool, typer.Option("--force", help="Run the stage even if it is fresh; with run, every stage.")]
-
-
-def _jobs(given: str) -> int:
-    """Return the value of --jobs.
-
-    Raises
-    ------
-    BadParameter : when it is no whole number above 0
-    """
-    if not str(given).isdecimal() or int(given) < 1:
-        raise typer.BadParameter(f"must be a whole number, 1 or more (got {given})")
-    return int(given)
-
-
-Jobs = Annotated[
-    int, typer.Option("--jobs", metavar="N", parser=_jobs, help="Threads or processes that a stage may use.")
-]
-CORES = os.cpu_count() or 1
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages report, and tracebacks.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
-
-RUNS = Path("runs")
-
-
-def command_line(name: str, config: Path, runs: Path, overrides: Sequence[str]) -> str:
-    """Return what to type for another command on the same config, with the same results folder and values."""
-    options = ["--runs", str(runs)] if runs != RUNS else []
-    return shlex.join(["pzd", name, str(config), *options, *(word for one in overrides for word in ("--set", one))])

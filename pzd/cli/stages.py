@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from pzd.cli.look import diagnosis_lines
-from pzd.cli.output import (
-    CORES,
-    RUNS,
-    Config,
-    Force,
-    Jobs,
-    Output,
-    Quiet,
-    Runs,
-    Set,
-    Verbose,
-    complain,
-    exit_code,
-)
+from pzd.cli.options import Call, on_config
+from pzd.cli.output import complain, exit_code
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pzd.runs import Run
 
 _SUMMARIES = {
@@ -58,36 +45,18 @@ _AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _pag
 
 
 def _command(name: str, summary: str) -> Callable[..., int]:
-    def command(
-        config: Config,
-        runs: Runs = RUNS,
-        overrides: Set = None,
-        force: Force = False,
-        jobs: Jobs = CORES,
-        quiet: Quiet = False,
-        verbose: Verbose = False,
-    ) -> int:
-        from pzd.pipeline.command import execute, opened
-
-        output = Output(quiet=quiet, verbose=verbose)
-        given = opened(config, runs, overrides or ())
-        marks = execute(given, name, force=force, jobs=jobs, say=output.say, progress=output.progress)
+    def command(call: Call) -> int:
+        marks = call.execute(name, force=call.force)
         if name in _AT_THE_END:
-            output.say(*_AT_THE_END[name](given.run, verbose=verbose))
+            call.output.say(*_AT_THE_END[name](call.opened.run, verbose=call.output.verbose))
         return exit_code(marks)
 
     command.__name__, command.__doc__ = name, summary
-    return command
+    return on_config("force", "jobs")(command)
 
 
-def watch(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    jobs: Jobs = CORES,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
+@on_config("jobs")
+def watch(call: Call) -> int:
     """Run what is stale, now and whenever the config or a file that it names changes, until Ctrl-C.
 
     A file that is still being written is waited for; a mistake in the config or in a record is printed, and the next
@@ -98,30 +67,26 @@ def watch(
     from pzd.pipeline.command import check_given
     from pzd.pipeline.watching import EVERY_S, WatchedFiles, looks
 
-    output = Output(quiet=quiet, verbose=verbose)
-    check_given(config)
-    output.say(f"watching {config} and the files that it names; Ctrl-C ends it")
-    for look in looks(WatchedFiles(config, overrides or ()).state, lambda: time.sleep(EVERY_S)):
-        output.say(*look.lines)
+    check_given(call.config)
+    call.output.say(f"watching {call.config} and the files that it names; Ctrl-C ends it")
+    for look in looks(WatchedFiles(call.config, call.overrides).state, lambda: time.sleep(EVERY_S)):
+        call.output.say(*look.lines)
         if look.settled:
-            _run(config, runs, overrides or (), jobs, output)
+            _run(replace(call))  # a copy reads the config anew
     raise AssertionError("a watch has no end of its own")
 
 
-def _run(config: Path, runs: Path, overrides: Sequence[str], jobs: int, output: Output) -> None:
+def _run(call: Call) -> None:
     """Bring the run up to date, or print what is wrong."""
-    from pzd.pipeline.command import execute, opened
-    from pzd.pipeline.run_summary import page_of
     from pzd.schema.errors import UserError
 
     try:
-        given = opened(config, runs, overrides)
-        marks = execute(given, "run", force=False, jobs=jobs, say=output.say, progress=output.progress)
+        marks = call.execute("run")
     except UserError as error:
         complain(error.messages)
         return
-    output.say(f"report: {page_of(given.run)}")
-    complain(f"not to be trusted: {mark}" for mark in marks)
+    call.output.say(*_page(call.opened.run))
+    exit_code(marks)
 
 
 COMMANDS = (*(_command(name, summary) for name, summary in _SUMMARIES.items()), watch)

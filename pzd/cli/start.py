@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.cli.output import DONE, Json, Output, Verbose
+from pzd.cli.options import Json, Verbose
+from pzd.cli.output import DONE, Output
 
 if TYPE_CHECKING:
     from pzd.damper.effect import Effect
@@ -27,7 +28,7 @@ def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -
     from pzd.rig.files.guess import guessed
     from pzd.schema.errors import ConfigError
 
-    output = Output(quiet=False, verbose=verbose)
+    output = Output(verbose=verbose)
     absent = [path for path in files if not path.is_file()]
     if absent:
         raise ConfigError(map(_absent, absent))
@@ -47,7 +48,7 @@ def schema(verbose: Verbose = False) -> int:
     """Print the JSON schema of a config."""
     from pzd.config import RunConfig
 
-    Output(quiet=False, verbose=verbose).say_json(RunConfig.model_json_schema())
+    Output(verbose=verbose).say_json(RunConfig.model_json_schema())
     return DONE
 
 
@@ -70,12 +71,11 @@ def effects(propose: Propose = None, out: Out = None, as_json: Json = False, ver
     from pzd.damper.effects import library
     from pzd.report import tables
 
-    output = Output(quiet=False, verbose=verbose)
+    output = Output(verbose=verbose, as_json=as_json and propose is None)
     if propose is not None:
         return _propose(propose, out, output)
     if as_json:
         output.say_json([_effect_as_data(effect) for effect in library().values()])
-        return DONE
     output.say(*tables.effects(library().values()).lines())
     return DONE
 

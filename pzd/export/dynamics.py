@@ -159,11 +159,7 @@ class Dynamics:
 def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
     """Return start values of inputs and parameters by their name in C."""
     nearest = float(dynamics.signals[np.argmin(np.abs(dynamics.signals))])
-    return {
-        "START_SIGNAL": nearest,
-        "START_TEMPERATURE": dynamics.reference,
-        "START_ZERO": content.damper.zero_m,
-    }
+    return {"START_SIGNAL": nearest, "START_TEMPERATURE": dynamics.reference, "START_ZERO": content.damper.zero_m}
 
 
 def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:

@@ -120,7 +120,7 @@ class Pipeline:
 
     def made(self, stage: Stage) -> Artefact:
         """Return what a stage makes of its inputs, written nowhere."""
-        return stage.function(**{name: self._argument(name, kind) for name, kind in stage.takes.items()})
+        return stage.function(**stage.fixed, **{name: self._argument(name, kind) for name, kind in stage.takes.items()})
 
     def _argument(self, name: str, annotation: Any) -> Any:
         """Return what a parameter of a stage is given; artefacts are what their files hold, however they were made."""

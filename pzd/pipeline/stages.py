@@ -5,11 +5,11 @@ from __future__ import annotations
 import inspect
 import typing
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from pzd.artefacts import Artefact
+from pzd.artefacts import Artefact, Rides
 from pzd.config import RunConfig
 
 LAST = "report"
@@ -22,12 +22,14 @@ class Stage:
 
     name: str
     function: Callable[..., Artefact]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    """Arguments that depend neither on the config nor on another stage."""
 
     @cached_property
     def takes(self) -> Mapping[str, Any]:
-        """What the function asks for: the annotation of every parameter."""
+        """What the function asks for: the annotation of every parameter that is not fixed."""
         hints = typing.get_type_hints(self.function)
-        return {name: hints[name] for name in inspect.signature(self.function).parameters}
+        return {name: hints[name] for name in inspect.signature(self.function).parameters if name not in self.fixed}
 
     @cached_property
     def makes(self) -> type[Artefact]:
@@ -46,15 +48,17 @@ def stages(config: RunConfig) -> tuple[Stage, ...]:
     from pzd.diagnosis.stage import diagnose
     from pzd.force_table.stage import tabulate
     from pzd.identification.stage import identify
-    from pzd.report.stage import report, report_without_car
+    from pzd.report.stage import report
     from pzd.rig.stage import ingest, synthesise
+    from pzd.simulate.config import SimulateConfig
     from pzd.simulate.stage import simulate
 
     ridden = (Stage("simulate", simulate), Stage(LAST, report))
+    not_ridden = (Stage(LAST, report, {"simulate": SimulateConfig(), "rides": Rides()}),)
     return (
         Stage("synthesise", synthesise) if config.rig.virtual else Stage("ingest", ingest),
         Stage("identify", identify),
         Stage("diagnose", diagnose),
         Stage("table", tabulate),
-        *(ridden if config.car else (Stage(LAST, report_without_car),)),
+        *(ridden if config.car else not_ridden),
     )

@@ -18,22 +18,18 @@ TIMES = "\u00d7"
 NO_BREAK = "\u00a0"
 """A space at which no line breaks."""
 
-_UNITS = {
-    "m/s2": "m/s²",
-    "m/s3": "m/s³",
-    "m/s^1.75": "m/s¹·⁷⁵",
-    "N s/m": "N s/m",
-    "N s2/m2": "N s²/m²",
-    "N/m2": "N/m²",
-    "degC": "°C",
-    "-": "",
-}
+_UNITS = {"m/s^1.75": "m/s¹·⁷⁵", "degC": "°C", "-": ""}
+"""Units that are printed otherwise than with their digits raised."""
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def unit_of(unit: str) -> str:
-    """Return a unit as it is printed."""
-    return _UNITS.get(unit, unit)
+    """Return a unit as it is printed.
+
+    >>> unit_of("N s2/m2")
+    'N s²/m²'
+    """
+    return _UNITS[unit] if unit in _UNITS else unit.translate(_SUPERSCRIPT)
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -102,6 +98,9 @@ def sentence(text: str) -> str:
 
 # --- Sections and their blocks ---
 
+WIDE = 36
+"""Characters from which on the lines of a cell are broken."""
+
 
 @dataclass(frozen=True)
 class Paragraph:
@@ -133,9 +132,10 @@ class TextTable:
 
     @property
     def numeric(self) -> tuple[bool, ...]:
-        """Which columns hold numbers."""
+        """Which columns hold numbers: cells that begin as such and are no longer than an interval with its unit."""
         return tuple(
-            column > 0 and all(row[column][:1] in "(>0123456789\u2212\u2013" for row in self.rows)
+            column > 0
+            and all(row[column][:1] in "(>0123456789\u2212\u2013" and len(row[column]) <= WIDE for row in self.rows)
             for column in range(len(self.header))
         )
 

@@ -117,16 +117,9 @@ class Medium:
         return f"{value} ({low} to {high})"
 
 
-def plain_number(value: float, digits: int = 4) -> str:
-    """Return a number to so many significant digits, as programs write it."""
-    return f"{value:.{digits}g}"
-
-
-def _ascii(unit: str) -> str:
-    return "" if unit == "-" else unit
-
-
-TERMINAL = Medium("-", plain_number, _ascii, " ", 1, units_in_head=True)
+TERMINAL = Medium(
+    "-", lambda value, digits: f"{value:.{digits}g}", lambda unit: unit.removeprefix("-"), " ", 1, units_in_head=True
+)
 PAGE = Medium(blocks.DASH, blocks.number, blocks.unit_of, NO_BREAK, 0, units_in_head=False)
 
 

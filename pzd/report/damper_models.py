@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from pzd.artefacts import Diagnosed, Identified, ParameterRow
+from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.damper.compose import respond, static_force
 from pzd.damper.confounders import known, module_of
 from pzd.damper.fitted_laws import fitted_laws
@@ -25,11 +25,6 @@ class DamperModels:
     """T0, C and k of each condition as identify found them."""
     _forces: dict[str, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     """Simulated forces by record: several pictures show the same ones."""
-
-    @classmethod
-    def of(cls, identified: Identified, diagnosed: Diagnosed, setting: str | None) -> DamperModels:
-        """Collect the dampers of one setting."""
-        return cls(diagnosed, tuple(row for row in identified.rows if row.setting == setting))
 
     @property
     def final_parameters(self) -> tuple[ParameterRow | BaseRow, ...]:

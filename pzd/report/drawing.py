@@ -14,7 +14,7 @@ import numpy as np
 from pzd.artefacts import SummaryRow
 from pzd.parallel.processes import parallel_map
 from pzd.record import Array
-from pzd.report.blocks import Picture
+from pzd.report.blocks import Picture, Pictures
 from pzd.report.context import ReportContext
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Place = Literal["characteristics", "model", "missing", "damper", "passenger", "policies"]
 """Where on the page a plot stands."""
-PLACES: tuple[Place, ...] = get_args(Place)
 
 MEASURED = "#4d4d4d"
 BASELINE = "#d55e00"
@@ -36,12 +35,7 @@ MUTED = "#b8c4d0"
 INK = "#1f2933"
 BY_FIDELITY = {"ideal": "#56b4e9", "table": "#009e73", "dynamic": "#0072b2"}
 """Colours of controlled rides, of Okabe and Ito (2008), which people with any colour vision tell apart."""
-BY_POLICY = {
-    "best_fixed_voltage": "#d55e00",
-    "best_constant_c": "#cc79a7",
-    "passive": "#4d4d4d",
-    "constant": "#e69f00",
-}
+BY_POLICY = {"best_fixed_voltage": "#d55e00", "best_constant_c": "#cc79a7", "passive": "#4d4d4d", "constant": "#e69f00"}
 """Likewise, of the rides that a controlled one is compared with."""
 MAP = "cividis"
 """Colour map that reads the same in grey and with any colour vision."""
@@ -103,17 +97,26 @@ _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
 """Width of a letter of a tick label."""
 _LEGEND_COLUMNS = 4
+_LONGEST_LABEL = 34
+"""Characters of a label of the vertical axis."""
 
 
 def axes(
-    height: float = 3.1, labels: Iterable[str] = ("-0.000",), *, key: int = 1, right: float = 0.12
+    x: str,
+    y: str = "",
+    *,
+    height: float = 3.1,
+    labels: Iterable[str] = ("-0.000",),
+    key: int = 1,
+    right: float = 0.12,
 ) -> tuple[Figure, Axes]:
     """Return an empty figure of one axes, of a size that stays readable on a telephone.
 
     Parameters
     ----------
+    x, y : quantity and unit of each axis
     height : of the whole figure [in]
-    labels : of the vertical axis; the longest decides where the axes begin
+    labels : of the ticks of the vertical axis; the longest decides where the axes begin
     key : lines of a legend for which room is kept above
     right : margin to the right [in]
 
@@ -127,7 +130,12 @@ def axes(
     left = 0.33 + _LETTER_IN * max(len(label) for label in labels)
     below, above = 0.5, 0.1 + 0.21 * key
     box = (left / _WIDTH_IN, below / height, 1.0 - (left + right) / _WIDTH_IN, 1.0 - (below + above) / height)
-    return figure, figure.add_axes(box)
+    return figure, figure.add_axes(box, xlabel=x, ylabel=y)
+
+
+def shortened(label: str) -> str:
+    """Return the end of a label that would leave no room for the picture."""
+    return label if len(label) <= _LONGEST_LABEL else f"...{label[3 - _LONGEST_LABEL :]}"
 
 
 def legend(figure: Figure, columns: int = 3) -> None:
@@ -151,14 +159,15 @@ def styled() -> Iterator[None]:
         yield
 
 
-def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
+def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> Pictures:
     """Draw and encode the panels of each plot, `jobs` plots at the same time."""
 
-    def drawn(plot: Plot) -> tuple[Picture, ...]:
-        return tuple(encoded(panel) for panel in plot.draw(context))
+    def drawn(plot: Plot) -> tuple[Place, tuple[Picture, ...]]:
+        return plot.place, tuple(encoded(panel) for panel in plot.draw(context))
 
     with styled():
-        return parallel_map(drawn, plots, jobs)
+        found = parallel_map(drawn, plots, jobs)
+    return {place: tuple(panels for where, panels in found if where == place) for place in get_args(Place)}
 
 
 def encoded(panel: Panel) -> Picture:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pzd.artefacts import ForceRow, Gap
-from pzd.report.blocks import Card, Pictures, Section, amount, listed, number, percent, sentence, spelled
+from pzd.report.blocks import WIDE, Card, Section, amount, listed, number, percent, sentence, spelled
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
-from pzd.report.drawing import PLACES, pictures
+from pzd.report.drawing import pictures
 from pzd.report.plots import library
 from pzd.report.ride_comfort import UNCONTROLLED, Comparison, RatedRides
 from pzd.report.sections import damper, missing, passenger, tested, trust
@@ -171,7 +171,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
     context : the run
     jobs : pictures drawn at the same time
     """
-    drawn = _drawn(context, jobs)
+    drawn = pictures(tuple(library().values()), context, jobs)
     sections = (
         tested.render(context),
         *tested.render_characteristics(context, drawn),
@@ -183,13 +183,8 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         trust.render(context),
         trust.render_provenance(context),
     )
-    return render(_title(context), cards(context), _assumed(context), sections)
-
-
-def _drawn(context: ReportContext, jobs: int) -> Pictures:
-    plots = list(library().values())
-    drawn = list(zip(plots, pictures(plots, context, jobs), strict=True))
-    return {place: tuple(panels for plot, panels in drawn if plot.place == place) for place in PLACES}
+    title = "Damper and comfort report" if context.ridden else "Damper report"
+    return render(": ".join(filter(None, (title, context.setting))), cards(context), _assumed(context), sections)
 
 
 def _assumed(context: ReportContext) -> tuple[str, ...]:
@@ -198,11 +193,6 @@ def _assumed(context: ReportContext) -> tuple[str, ...]:
         return ()
     damper = context.diagnosed.damper
     return assumed(context.simulate, damper.effects, all(row.voltage_V is not None for row in damper.base))
-
-
-def _title(context: ReportContext) -> str:
-    kind = "Damper and comfort report" if context.ridden else "Damper report"
-    return f"{kind}: {context.setting}" if context.setting else kind
 
 
 _FOOTER = "Written by pzd. Every number of this page stands in the files of the run beside it, or follows from them."
@@ -216,7 +206,14 @@ def render(
     footer: str = _FOOTER,
 ) -> str:
     """Fill the template of the report."""
-    texts = {"title": title, "cards": headline, "assumed": assumed, "sections": sections, "footer": footer}
+    texts = {
+        "title": title,
+        "cards": headline,
+        "assumed": assumed,
+        "sections": sections,
+        "footer": footer,
+        "wide": WIDE,
+    }
     return filled("pzd.report", "report.html", texts)
 
 

@@ -122,11 +122,9 @@ def _loops(record: Record, findings: Sequence[Finding]) -> list[Panel]:
         (record.velocity, "velocity [m/s]", "Force over velocity"),
         (1000.0 * record.displacement, "displacement [mm]", "Force over displacement"),
     ):
-        figure, ax = axes(4.2, key=0)
+        figure, ax = axes(label, "force [kN]", height=4.2, key=0)
         ax.plot(values[::step], record.force[::step] / 1000.0, color=FINAL, linewidth=0.6)
         ax.plot(values[marked], record.force[marked] / 1000.0, "o", markersize=8.0, fillstyle="none", color=BASELINE)
-        ax.set_xlabel(label)
-        ax.set_ylabel("force [kN]")
         caption = "Circles: where findings are." if marked else ""
         panels.append(Panel(figure, title, f"{title} of {record.name}, all of the record.", caption))
     return panels

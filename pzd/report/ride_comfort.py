@@ -64,11 +64,6 @@ class RatedRide:
         return Components(np.array([row.frequency_Hz for row in self.spectrum]), levels, 1.0)
 
     @property
-    def method(self) -> str:
-        """How the components were computed."""
-        return self.spectrum[0].method
-
-    @property
     def of_event(self) -> bool:
         """Whether the ride is over a single event."""
         return self.ridden.ending != "end of the ride"
@@ -288,7 +283,7 @@ def _edition_1978(ride: RatedRide) -> Iterator[Measure]:
     for boundary in iso2631_1978.FACTORS:
         found = iso2631_1978.shortest(parts, boundary)
         place = f"governed by {found.frequency:.4g} Hz" if found.frequency is not None else ""
-        status = "; ".join(text for text in (iso2631_1978.TRUST, found.remark, ride.method, place) if text)
+        status = "; ".join(text for text in (iso2631_1978.TRUST, found.remark, ride.spectrum[0].method, place) if text)
         yield f"exposure_time_{boundary}", found.minutes, "min", status
 
 

@@ -26,6 +26,8 @@ def report(
 ) -> Report:
     """Rate every ride by the standards asked for, compare expected numbers, and write one page on the whole run.
 
+    Without rides the page is on the damper alone, and there is no comfort to rate.
+
     Parameters
     ----------
     config : editions, and what the page shows
@@ -61,54 +63,9 @@ def report(
         logging.getLogger(__name__).info("%d comfort values of %d rides", len(comfort), len(ratings))
     reference = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     used = setting_in_use(identified, setting)
-    context = ReportContext(
-        config=config,
-        simulate=simulate,
-        rig=rig,
-        identified=identified,
-        diagnosed=diagnosed,
-        table=table,
-        rides=rides,
-        control=control,
-        setting=used,
-        tests=RigTests(rig, identified, control, used, config.records_shown),
-        damper=DamperModels.of(identified, diagnosed, used),
-        rated=RatedRides(ratings, comfort, simulate, control),
-        expected=reference,
-    )
+    tests = RigTests(rig, identified, control, used, config.records_shown)
+    dampers = DamperModels(diagnosed, tuple(row for row in identified.rows if row.setting == used))
+    rides_rated = RatedRides(ratings, comfort, simulate, control)
+    artefacts = (rig, identified, diagnosed, table, rides)
+    context = ReportContext(config, simulate, *artefacts, control, used, tests, dampers, rides_rated, reference)
     return Report(comfort=comfort, page=page(context, jobs), reference=reference)
-
-
-def report_without_car(
-    config: ReportConfig,
-    rig: Rig,
-    identified: Identified,
-    diagnosed: Diagnosed,
-    table: Table,
-    control: Control,
-    setting: str | None,
-    folder: Path,
-    jobs: int = 1,
-) -> Report:
-    """Write one page on the damper alone, where the config leaves the car out; there is no comfort to rate.
-
-    Parameters
-    ----------
-    config : what the page shows
-    rig, identified, diagnosed, table : artefacts of the stages before
-    control : the control signal of the valve
-    setting : of the rig's settings, the one in use
-    folder : of the config, from which the path of expected numbers counts
-    jobs : pictures drawn at the same time
-
-    Returns
-    -------
-    the page, and the numbers beside those expected where the config names any
-
-    Raises
-    ------
-    ConfigError : when there is no such file of expected numbers
-    DataError : when it is at fault, with every place
-    """
-    none = Rides()
-    return report(config, SimulateConfig(), rig, identified, diagnosed, table, none, control, setting, folder, jobs)

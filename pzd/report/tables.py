@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from pzd.artefacts import (
@@ -15,11 +15,10 @@ from pzd.artefacts import (
     SettingLeftOutRow,
     SettingRow,
     SummaryRow,
-    Value,
 )
 from pzd.artefacts.csv_rows import Estimate
-from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
-from pzd.artefacts.identified import AVERAGED, courses
+from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow
+from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
 from pzd.artefacts.knee import DIRECTIONS
 from pzd.artefacts.rig import slowest_test_force
 from pzd.artefacts.table import at_largest_speed
@@ -89,115 +88,94 @@ def _base_value(row: ParameterRow | BaseRow, name: str) -> Estimate:
 
 def characteristics(found: Characteristics, control: Control) -> Iterator[Table]:
     """Yield the tables of what the tests show without any model: those that have rows."""
+    setting, _, temperature = conditions(control)
+
+    def static_force(row: GasAndFrictionRow, value: float) -> Difference:
+        return Difference(value, slowest_test_force(found, row))
+
     tables = (
-        peak_velocity(found, control),
-        gas_and_friction(found, control),
-        steps(found, control),
-        warm_up(found, control),
-        as_it_stands(found, control),
+        Table(
+            "Force at the peak speed of each test (PVP), rebound positive",
+            (
+                *conditions(control),
+                Column("velocity_m_per_s", "speed", "m/s", lambda row: row.speed),
+                Column("rebound_force_N", "rebound", "N"),
+                Column("compression_force_N", "compression", "N"),
+                Column("kind", "test"),
+                Column("amplitude_m", "amplitude", "mm", factor=1000.0),
+                Column("frequency_Hz", "frequency", "Hz", optional=True),
+                Column("record", "record"),
+            ),
+            found.peak_velocity,
+            FOLD,
+        ),
+        Table(
+            "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
+            (
+                *conditions(control),
+                Column("gas_force_N", "gas force", "N", lambda row: static_force(row, row.gas_force_N)),
+                Column("friction_N", "friction", "N", lambda row: static_force(row, row.friction_N)),
+                Column("velocity_m_per_s", "slowest speed", "m/s"),
+                Column("method", "how"),
+            ),
+            found.gas_and_friction,
+            FOLD,
+        ),
+        Table(
+            f"Measured response to steps of the {control.name}",
+            (
+                setting,
+                temperature,
+                Column("voltage_V", "step", control.unit, lambda row: Span(row.from_voltage_V, row.to_voltage_V)),
+                Column("velocity_m_per_s", "speed", "m/s"),
+                Column("force_N", "force", "N", lambda row: Span(row.from_force_N, row.to_force_N)),
+                Column("to_63_percent_s", "to 63 %", "ms", factor=1000.0),
+                Column("to_90_percent_s", "to 90 %", "ms", factor=1000.0),
+                Column("status", "status"),
+                Column("record", "record"),
+                Column("time_s", "at", "s", digits=4),
+            ),
+            found.steps,
+            FOLD,
+        ),
+        Table(
+            f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last",
+            (
+                *conditions(control, lambda course: course.first)[:2],
+                Column("velocity_m_per_s", "speed", "m/s", lambda course: course.first.velocity_m_per_s),
+                Column("cycles", "cycles"),
+                _course("temperature_degC", "temperature", "degC"),
+                _course("rebound_force_N", "rebound", "N"),
+                _course("compression_force_N", "compression", "N"),
+                Column("record", "record", value=lambda course: course.first.record),
+            ),
+            courses(found.warm_up),
+            FOLD,
+        ),
+        Table(
+            "Records that are none of these tests, as they stand: extremes of all samples",
+            (
+                *conditions(control),
+                Column("force_N", "force", "N", lambda r: Span(r.compression_force_N, r.rebound_force_N)),
+                Column(
+                    "velocity_m_per_s",
+                    "velocity",
+                    "m/s",
+                    lambda row: Span(row.compression_velocity_m_per_s, row.rebound_velocity_m_per_s),
+                ),
+                Column("stroke_m", "stroke", "mm", factor=1000.0),
+                Column("duration_s", "duration", "s"),
+                Column("record", "record"),
+            ),
+            found.as_it_stands,
+            FOLD,
+        ),
     )
     return (table for table in tables if table.rows)
 
 
-def peak_velocity(found: Characteristics, control: Control) -> Table:
-    """Return the force at the peak speed of each test (PVP)."""
-    return Table(
-        "Force at the peak speed of each test (PVP), rebound positive",
-        (
-            *conditions(control),
-            Column("velocity_m_per_s", "speed", "m/s", lambda row: row.speed),
-            Column("rebound_force_N", "rebound", "N"),
-            Column("compression_force_N", "compression", "N"),
-            Column("kind", "test"),
-            Column("amplitude_m", "amplitude", "mm", factor=1000.0),
-            Column("frequency_Hz", "frequency", "Hz", optional=True),
-            Column("record", "record"),
-        ),
-        found.peak_velocity,
-        FOLD,
-    )
-
-
-def gas_and_friction(found: Characteristics, control: Control) -> Table:
-    """Return gas force and friction at mid-stroke."""
-    return Table(
-        "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
-        (
-            *conditions(control),
-            Column("gas_force_N", "gas force", "N", lambda r: Difference(r.gas_force_N, slowest_test_force(found, r))),
-            Column("friction_N", "friction", "N", lambda r: Difference(r.friction_N, slowest_test_force(found, r))),
-            Column("velocity_m_per_s", "slowest speed", "m/s"),
-            Column("method", "how"),
-        ),
-        found.gas_and_friction,
-        FOLD,
-    )
-
-
-def steps(found: Characteristics, control: Control) -> Table:
-    """Return the response to steps of the control signal."""
-    setting, _, temperature = conditions(control)
-    return Table(
-        f"Measured response to steps of the {control.name}",
-        (
-            setting,
-            temperature,
-            Column("voltage_V", "step", control.unit, lambda row: Span(row.from_voltage_V, row.to_voltage_V)),
-            Column("velocity_m_per_s", "speed", "m/s"),
-            Column("force_N", "force", "N", lambda row: Span(row.from_force_N, row.to_force_N)),
-            Column("to_63_percent_s", "to 63 %", "ms", factor=1000.0),
-            Column("to_90_percent_s", "to 90 %", "ms", factor=1000.0),
-            Column("status", "status"),
-            Column("record", "record"),
-            Column("time_s", "at", "s", digits=4),
-        ),
-        found.steps,
-        FOLD,
-    )
-
-
-def warm_up(found: Characteristics, control: Control) -> Table:
-    """Return from where to where the force of a long test goes."""
-    return Table(
-        f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last",
-        (
-            *conditions(control, lambda course: course.first)[:2],
-            Column("velocity_m_per_s", "speed", "m/s", lambda course: course.first.velocity_m_per_s),
-            Column("cycles", "cycles"),
-            _course("temperature_degC", "temperature", "degC"),
-            _course("rebound_force_N", "rebound", "N"),
-            _course("compression_force_N", "compression", "N"),
-            Column("record", "record", value=lambda course: course.first.record),
-        ),
-        courses(found.warm_up),
-        FOLD,
-    )
-
-
 def _course(name: str, head: str, unit: str) -> Column:
     return Column(name, head, unit, lambda course: Span(getattr(course.first, name), getattr(course.last, name)))
-
-
-def as_it_stands(found: Characteristics, control: Control) -> Table:
-    """Return the extremes of records that are none of these tests."""
-    return Table(
-        "Records that are none of these tests, as they stand: extremes of all samples",
-        (
-            *conditions(control),
-            Column("force_N", "force", "N", lambda r: Span(r.compression_force_N, r.rebound_force_N)),
-            Column(
-                "velocity_m_per_s",
-                "velocity",
-                "m/s",
-                lambda row: Span(row.compression_velocity_m_per_s, row.rebound_velocity_m_per_s),
-            ),
-            Column("stroke_m", "stroke", "mm", factor=1000.0),
-            Column("duration_s", "duration", "s"),
-            Column("record", "record"),
-        ),
-        found.as_it_stands,
-        FOLD,
-    )
 
 
 # --- identify: the knee law, in the language of the trade ---
@@ -208,7 +186,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
     directions = found.directions()
     of_direction = (*conditions(control, lambda each: each.row), Column("direction", "direction"))
     yield Table(
-        "Law of the element handed on",
+        "Adopted law of the element",
         (Column("setting", "setting", optional=True), Column("law", "law"), Column("reason", "reason")),
         found.laws,
     )
@@ -272,7 +250,7 @@ def knee_prediction(found: Knees, control: Control) -> Table:
     return Table(
         "Tests predicted by both laws, each fitted without them",
         (
-            Column("record", "test kept back"),
+            Column("record", "held-out test"),
             *conditions(control),
             Column("W_s_bingham", "W_s by one T0 and C"),
             Column("W_s_knee", "W_s by the knee law"),
@@ -311,12 +289,12 @@ def prediction(found: Prediction, control: Control) -> Table:
     tests = [each.model_dump() for each in found.by]
     voltages = [{"record": "all tests, left out", **each.model_dump()} for each in found.left_out_voltages]
     return Table(
-        f"What was kept back from the fit ({how}), and how it is predicted",
+        f"Prediction of held-out data ({how}) by a fit to the others",
         (
-            Column("record", "kept back", value=lambda row: row["record"]),
+            Column("record", "held out", value=lambda row: row["record"]),
             signal(control, lambda row: row["voltage"]),
             Column("W_s_plain", "W_s, simple model", value=lambda row: row["W_s_plain"]),
-            Column("W_s", "W_s, as handed on", value=lambda row: row["W_s"]),
+            Column("W_s", "W_s, adopted damper", value=lambda row: row["W_s"]),
         ),
         [whole, *tests, *voltages],
         fold=7,  # the row of all and six tests
@@ -329,7 +307,7 @@ def effect_parameters(diagnosis: Diagnosis, control: Control) -> Table:
         (effect, _counted_from(diagnosis, effect, name), voltage, estimate, value.unit)
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
-        for voltage, estimate in zip(_voltages(value), value.estimates, strict=True)
+        for voltage, estimate in zip(value.at_voltage_V or (None,) * len(value.estimates), value.estimates, strict=True)
     ]
     return Table(
         "What was added",
@@ -349,10 +327,6 @@ def _counted_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
     return f"{name} to either side of x = {1000.0 * diagnosis.zero_m:.3g} mm" if is_place else name
 
 
-def _voltages(value: Value) -> Sequence[float | None]:
-    return value.at_voltage_V or (None,) * len(value.estimates)
-
-
 def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
     """Yield the tables of the comparison with published models, the models side by side: those that have rows."""
     held_out = [row for row in found.rows if row.kept_back == "test"]
@@ -369,9 +343,11 @@ def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
         *(_of_model("W_s", model) for model in found.models),
         *(_of_model("R2", model, decimals=4) for model in found.models),  # four places tell 0.994 from 0.996
     )
+    count = len(found.models)
     for title, rows in parts.items():
-        if rows:
-            yield Table(title, columns, _side_by_side(rows, len(found.models)))
+        if rows:  # those of a test stand together, one for each model
+            tests = [{row.model: row for row in rows[first : first + count]} for first in range(0, len(rows), count)]
+            yield Table(title, columns, tests)
     yield _peer_parameters(found.parameters, control)
 
 
@@ -381,13 +357,12 @@ def _of_model(name: str, model: str, decimals: int | None = None) -> Column:
     )
 
 
-def _side_by_side(rows: Sequence[PeerRow], models: int) -> list[Mapping[str, PeerRow]]:
-    """Return one mapping from model to row for each test; the rows of a test stand together."""
-    return [{row.model: row for row in rows[first : first + models]} for first in range(0, len(rows), models)]
-
-
 def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Table:
     """Return the parameters of published models, a line for each model and control value."""
+
+    def assignment(row: PeerParameterRow) -> str:
+        return f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}"
+
     fits: dict[tuple[Any, ...], list[PeerParameterRow]] = {}
     for row in rows:
         fits.setdefault((row.setting, row.voltage_V, row.model, row.form, row.status), []).append(row)
@@ -396,15 +371,11 @@ def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Tabl
         (
             *conditions(control, lambda fit: fit[0])[:2],
             Column("model", "model", value=lambda fit: ", ".join(filter(None, (fit[0].model, fit[0].form)))),
-            Column("parameters", "parameters", value=lambda fit: ", ".join(map(_assignment, fit))),
+            Column("parameters", "parameters", value=lambda fit: ", ".join(map(assignment, fit))),
             Column("status", "fit", value=lambda fit: fit[0].status),
         ),
         list(fits.values()),
     )
-
-
-def _assignment(row: PeerParameterRow) -> str:
-    return f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}"
 
 
 # --- table: settings between tested ones ---
@@ -428,13 +399,13 @@ def interpolated_settings(rows: Sequence[SettingRow], control: Control) -> Table
 def left_out_settings(rows: Sequence[SettingLeftOutRow]) -> Table:
     """Return how well tested settings are predicted from their neighbours."""
     return Table(
-        "Tested settings predicted from their neighbours, missed in % of peak force",
+        "Tested settings predicted from their neighbours, with the error in % of peak force",
         (
             Column("setting", "left out"),
             Column("between", "predicted from", value=_neighbours),
             Column("peak_force_N", "its peak force", "N"),
-            share("rms_share_of_peak", "missed by (r.m.s.)"),
-            share("largest_share_of_peak", "at most"),
+            share("rms_share_of_peak", "error (r.m.s.)"),
+            share("largest_share_of_peak", "largest error"),
         ),
         rows,
     )

@@ -16,8 +16,9 @@ from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, Scatter, SweepConfig, Uniform
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section, TextTable, number
-from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, styled
+from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section
+from pzd.report.columns import Column, Table
+from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, shortened, styled
 from pzd.report.page import render
 from pzd.schema.csvfile import write_rows
 from pzd.schema.errors import counted
@@ -153,18 +154,15 @@ class Results:
         again = [_sobol(parts[:, generator.integers(n, size=n)]) for _ in range(RESAMPLES)]
         low, high = np.nanpercentile(again, INTERVAL, axis=0)
         combination, label, measure = labels
+        first, total = ([_estimate(*ends) for ends in zip(found[i], low[i], high[i], strict=True)] for i in (0, 1))
         return [
             IndexRow(
                 combination=combination,
                 about=label,
                 measure=measure,
                 quantity=name,
-                first_order=float(found[0, i]),
-                first_order_low95=_between(low[0, i], high[0, i], low[0, i]),
-                first_order_high95=_between(low[0, i], high[0, i], high[0, i]),
-                total_order=float(found[1, i]),
-                total_order_low95=_between(low[1, i], high[1, i], low[1, i]),
-                total_order_high95=_between(low[1, i], high[1, i], high[1, i]),
+                **first[i].columns("first_order"),
+                **total[i].columns("total_order"),
             )
             for i, name in enumerate(names)
         ]
@@ -219,9 +217,10 @@ def _sobol(parts: Array) -> Array:
     return np.stack([np.ravel(found.first_order), np.ravel(found.total_order)])
 
 
-def _between(low: float, high: float, end: float) -> float | None:
-    """Return an end of an interval; None where the interval has no width."""
-    return float(end) if np.isfinite(low) and low < high else None
+def _estimate(value: float, low: float, high: float) -> Estimate:
+    """Return an index with its interval, none where that has no width."""
+    known = np.isfinite(low) and low < high
+    return Estimate(float(value), float(low), float(high)) if known else Estimate(float(value))
 
 
 def write(results: Results, folder: Path, control: Control) -> None:
@@ -284,8 +283,6 @@ _MOST_TORNADOES = 4
 _MOST_NAMED = 3
 """Quantities named in a line of the terminal."""
 _FOOTER = "Written by pzd sweep. Every number of this page stands in the files beside it."
-_LONGEST_LABEL = 34
-"""Characters of a label that leave room for the picture."""
 
 
 def page(results: Results, title: str) -> str:
@@ -345,20 +342,16 @@ def _spread(results: Results, spread: Sequence[SpreadRow]) -> Section:
     shown = MEASURES[results.sweep.until]
     panels = [_strips([row for row in spread if row.measure == measure], measure) for measure in shown]
     blocks.append(Gallery(tuple(encoded(panel) for panel in panels if panel)))
-    rows = tuple(
-        (
-            _label(row.combination, row.about),
-            row.measure,
-            number(row.mean),
-            number(row.standard_deviation),
-            number(row.percent_5),
-            number(row.percent_95),
-        )
-        for row in spread
-        if row.measure in shown
+    columns = (
+        _OF,
+        Column("measure", "measure"),
+        Column("mean", "mean"),
+        Column("standard_deviation", "standard deviation"),
+        Column("percent_5", "5 %"),
+        Column("percent_95", "95 %"),
     )
-    header = ("of", "measure", "mean", "standard deviation", "5 %", "95 %")
-    blocks.append(TextTable("Results over the draws", header, rows, folded=len(rows) > _MOST_LINES))
+    rows = [row for row in spread if row.measure in shown]
+    blocks.append(Table("Results over the draws", columns, rows, _MOST_LINES).block())
     return Section("results", "Results", tuple(blocks))
 
 
@@ -375,18 +368,14 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
     text = "Total order: the share of the variance that stays when everything else is known; bars are 95 % intervals."
     if len(labels) > _MOST_TORNADOES:
         text += f" The first {_MOST_TORNADOES} of {len(labels)}; the table holds all."
-    rows = tuple(
-        (
-            _label(row.combination, row.about),
-            row.quantity,
-            _percent(row.first_order),
-            _percent(row.total_order),
-            _interval(row),
-        )
-        for row in mine
+    columns = (
+        _OF,
+        Column("quantity", "quantity"),
+        Column("first_order", "first order", words=_percent),
+        Column("total_order", "total order", words=_percent),
+        Column("interval", "95 % interval", value=_interval),
     )
-    header = ("of", "quantity", "first order", "total order", "95 % interval")
-    table = TextTable(f"Sobol indices of {measure}", header, rows, folded=len(rows) > _MOST_LINES)
+    table = Table(f"Sobol indices of {measure}", columns, mine, _MOST_LINES).block()
     gallery = Gallery(tuple(encoded(panel) for panel in tornadoes))
     return (Section("decides", "What decides", (Paragraph(text), gallery, table)),)
 
@@ -394,8 +383,8 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
 def _failed(results: Results) -> tuple[Section, ...]:
     if not results.failed:
         return ()
-    rows = tuple((f"{row.task}", row.differs_in, row.failure) for row in results.failed)
-    return (Section("failed", "Without a result", (TextTable("Runs", ("run", "differs in", "why"), rows),)),)
+    columns = (Column("task", "run"), Column("differs_in", "differs in"), Column("failure", "why"))
+    return (Section("failed", "Without a result", (Table("Runs", columns, results.failed).block(),)),)
 
 
 def _in_words(how: Uniform | Normal | Scatter) -> str:
@@ -414,6 +403,9 @@ def _label(combination: str, label: str) -> str:
     return ", ".join(part for part in (short, label) if part) or "all"
 
 
+_OF = Column("of", "of", value=lambda row: _label(row.combination, row.about))
+
+
 def _percent(share: float) -> str:
     """Write a share in percent; one that chance makes negative is 0."""
     return f"{max(share, 0.0):.0%}"
@@ -423,35 +415,30 @@ def _strips(rows: Sequence[SpreadRow], measure: str) -> Panel | None:
     if not rows:
         return None
     shown = rows[:_MOST_LINES]
-    labels = [_short(_label(row.combination, row.about)) for row in shown]
-    figure, ax = _lines(labels)
+    figure, ax = _lines(measure, [_label(row.combination, row.about) for row in shown])
     for place, row in enumerate(shown):
         ax.plot((row.percent_5, row.percent_95), (place, place), color=FINAL, linewidth=5.0, alpha=0.4)
         ax.plot(row.median, place, "o", color=FINAL, markersize=5.0)
-    ax.set_xlabel(measure)
     left_out = f" The first {_MOST_LINES} of {len(rows)}." if len(rows) > _MOST_LINES else ""
     return Panel(figure, measure, f"{measure} of every combination, median and nine draws of ten.", left_out.strip())
 
 
 def _tornado(rows: Sequence[IndexRow], measure: str) -> Panel:
     ordered = sorted(rows, key=lambda row: row.total_order)
-    figure, ax = _lines([_short(row.quantity) for row in ordered])
+    figure, ax = _lines("share of the variance (total order)", [row.quantity for row in ordered])
     for place, row in enumerate(ordered):
         ax.barh(place, row.total_order, color=FINAL, height=0.6)
         if interval := Estimate.of(row, "total_order").interval:
             ax.plot(interval, (place, place), color=BASELINE, linewidth=1.5)
-    ax.set_xlabel("share of the variance (total order)")
     label = _label(rows[0].combination, rows[0].about)
     return Panel(figure, f"{measure}, {label}", f"Share of the variance of {measure} by quantity.", "")
 
 
-def _lines(labels: Sequence[str]) -> tuple[Figure, Axes]:
-    figure, ax = axes(0.9 + 0.24 * len(labels), labels, key=0)
+def _lines(x: str, names: Sequence[str]) -> tuple[Figure, Axes]:
+    """Return axes with one line a name."""
+    labels = [shortened(name) for name in names]
+    figure, ax = axes(x, height=0.9 + 0.24 * len(labels), labels=labels, key=0)
     ax.set_yticks(range(len(labels)), labels)
     ax.set_ylim(-0.7, len(labels) - 0.3)
     ax.locator_params(axis="x", nbins=4)
     return figure, ax
-
-
-def _short(label: str) -> str:
-    return label if len(label) <= _LONGEST_LABEL else f"...{label[3 - _LONGEST_LABEL :]}"

@@ -156,7 +156,7 @@ def check_scatter(asked: Mapping[str, Scatter], diagnosed: Diagnosed) -> None:
     unknown = [name for name in asked if name not in there]
     if unknown:
         raise ConfigError(
-            f"sweep.damper: the damper handed on by diagnose has no such parameter; there is {', '.join(there)} "
+            f"sweep.damper: the damper that diagnose adopted has no such parameter; there is {', '.join(there)} "
             f"(got {', '.join(unknown)})"
         )
     scattered(diagnosed, asked, dict.fromkeys(asked, 0.0))

@@ -32,7 +32,6 @@ from pzd.artefacts import (
     Rides,
     Rig,
     SpectrumRow,
-    StepRow,
     SummaryRow,
     Table,
     TableNotes,
@@ -40,6 +39,7 @@ from pzd.artefacts import (
     WeightedRow,
     WheelRow,
 )
+from pzd.artefacts.identified import StepRow
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion

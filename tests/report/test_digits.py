@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
+from pzd.artefacts import Characteristics, Gap, Identified, ParameterRow
+from pzd.artefacts.identified import GasAndFrictionRow, PeakVelocityRow
 from pzd.cli.look import diagnosis_lines
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.verdict import hold_out_note
@@ -81,7 +82,7 @@ def static(gas: float) -> Characteristics:
 def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
     gas: float, printed: tuple[str, str], drawn: tuple[str, str]
 ) -> None:
-    table = tables.gas_and_friction(static(gas), Control())
+    *_, table = tables.characteristics(static(gas), Control())
     assert table.cells(TERMINAL)[1][:2] == printed
     assert tuple(cell.replace("\xa0N", "") for cell in table.cells(PAGE)[1][:2]) == drawn
 

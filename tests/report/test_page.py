@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
@@ -27,8 +28,8 @@ from pzd.artefacts import (
     Rig,
     Table,
     TableNotes,
-    WarmUpRow,
 )
+from pzd.artefacts.identified import WarmUpRow
 from pzd.damper.model import BaseRow, Damper
 from pzd.identification.characteristics import characteristics
 from pzd.quantities import Control
@@ -90,7 +91,7 @@ def read(page: str) -> Reader:
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """No pictures: for what the text alone must say."""
-    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
 
 
 def test_sections_stand_in_the_order_of_the_stages_and_every_tag_is_closed(read: Reader) -> None:
@@ -178,7 +179,7 @@ def test_the_headline_answers_five_questions(read: Reader) -> None:
 
 def test_rides_are_compared_at_equal_fidelity_and_by_name(read: Reader) -> None:
     """By the table control does better than the best fixed voltage, dynamically worse: each is told beside its own."""
-    _, _, table = read.text.partition("comfort beside the others at the same fidelity")
+    _, _, table = read.text.partition("The policy comfort compared with the others at the same fidelity")
     table, _, _ = table.partition("Acceleration at K")
     rows = re.findall(
         r"sine-([0-9.]+)Hz (\w+) (best fixed voltage 62 V|constant c = 4 500 N s/m) .*? (less|more)", table
@@ -229,7 +230,7 @@ def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None
 
 
 def test_the_final_damper_s_parameters_stand_first_with_intervals_and_the_simple_model_s_behind(read: Reader) -> None:
-    _, _, final = read.text.partition("T0, C and k beside what was missing")
+    _, _, final = read.text.partition("T0, C and k of the adopted damper")
     final, _, simple = final.partition("The simple model: T0, C and k of the Bingham element alone")
     assert "474 (469 to 480)" in final
     assert "ok" in final
@@ -247,7 +248,7 @@ def test_parameters_edited_by_hand_have_no_interval(run: Any, words_only: None) 
 
 
 def test_the_prediction_of_every_held_out_test_stands_in_a_table(read: Reader) -> None:
-    _, _, table = read.text.partition("What was kept back from the fit (whole tests)")
+    _, _, table = read.text.partition("Prediction of held-out data (whole tests)")
     for cells in (("r03", "150 V", "0.0123", "0.00091"), ("all tests, left out", "75 V", "0.0222", "0.0111")):
         for cell in cells:
             assert cell in table
@@ -355,8 +356,8 @@ def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> 
     assert (
         "A hypothesis on what is left: c |x| v, damping that depends on position, as bypass grooves give." in read.text
     )
-    assert "would close 81 % of the gap on tests kept back" in read.text.replace("\u00a0", " ")
-    assert "15 000 (14 000 to 16 000) N s/m2" in read.text.replace("\u00a0", " ")
+    assert "would close 81 % of the gap on held-out tests" in read.text.replace("\u00a0", " ")
+    assert "15 000 (14 000 to 16 000) N s/m\u00b2" in read.text.replace("\u00a0", " ")
     (alt,) = (of["alt"] for tag, of in read.tags if tag == "img" and "what is left" in (of["alt"] or "").lower())
     assert "c |x| v reaches \u221245 N at \u22120.003 m2/s" in str(alt)
 
@@ -390,7 +391,7 @@ def test_only_an_unexplained_residual_is_drawn_over_planes_by_frequency_by_distr
 
 def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
     none = Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page).text
-    assert "No shape of what is left predicts tests kept back better" in none
+    assert "No shape of what is left predicts held-out tests better" in none
     assert "hypothesis" not in Reader(run.told().page).text.lower()
 
 
@@ -460,7 +461,7 @@ def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypat
     curves = []
     monkeypatch.setattr(
         "pzd.report.page.pictures",
-        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or [()] * len(plots),
+        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or defaultdict(tuple),
     )
     for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
         replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -231,7 +232,7 @@ def test_a_file_that_is_none_is_a_mistake_of_the_config(tmp_path: Path) -> None:
 
 def test_the_stage_writes_what_the_config_names(run: Any, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
         written(tmp_path, f"{HEAD}off,{TEST.format(0)},measures.peak_force_N,1500,N,0.02\n")
         report = run.told(ReportConfig(reference="lab.csv"), folder=tmp_path)
         plain = run.told()

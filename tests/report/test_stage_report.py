@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ ALL = ReportConfig(
 def rows_only() -> Iterator[None]:
     """No pictures: these tests are about the rows."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
         yield
 
 

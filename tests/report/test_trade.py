@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,17 +10,8 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import (
-    AsItStandsRow,
-    Characteristics,
-    ClickRow,
-    KneeForceRow,
-    KneeRow,
-    Knees,
-    LawRow,
-    PredictedRow,
-    UnitRow,
-)
+from pzd.artefacts import Characteristics, ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
+from pzd.artefacts.identified import AsItStandsRow
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.report import tables
@@ -117,7 +109,7 @@ def with_knee(run: Any) -> Any:
 def words_only() -> Iterator[None]:
     """No pictures, which take most of the time of a page: all claims here are about its text."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
         yield
 
 
@@ -140,7 +132,7 @@ def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_directi
     ):
         assert cell in page
     assert "21.5" in page
-    assert "Law of the element handed on" in page
+    assert "Adopted law of the element" in page
 
 
 def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> None:

@@ -43,7 +43,7 @@ def acceleration(context: ReportContext) -> Iterator[Panel]:
 def _acceleration_panel(
     context: ReportContext, road: str, shown: tuple[SummaryRow, ...], histories: Mapping[str, Mapping[str, Array]]
 ) -> Panel:
-    figure, ax = axes(key=2)
+    figure, ax = axes("time [s]", "|a_K| [m/s²]", key=-(-len(shown) // 2))
     spans = {r.name: _PERIODS / r.frequency_Hz for r in context.simulate.roads if isinstance(r, Sine)}
     first = histories[shown[0].case]
     start, end = _window(first[_TIME], np.abs(first[_ACCELERATION]), spans.get(road))
@@ -52,15 +52,13 @@ def _acceleration_panel(
         within = (columns[_TIME] >= start) & (columns[_TIME] <= end)
         time, size = thinned(columns[_TIME][within] - start, np.abs(columns[_ACCELERATION][within]))
         colour, controlled = line_of(context, row)
-        ax.plot(time, size, color=colour, linestyle="-" if controlled else "--", label=context.rated.label(row))
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel("|a_K| [m/s²]")
+        ax.plot(time, size, color=colour, linestyle="-" if controlled else "--", label=context.rated.policy_label(row))
     ax.set_xlim(left=0.0)
     ax.set_ylim(bottom=0.0)
     legend(figure, 2)
     peaks = "; ".join(f"{context.rated.label(row)} {number(row.peak_abs_aK_m_per_s2)} m/s²" for row in shown)
     title = f"Acceleration at {shown[0].point}, {context.rated.road_label(road)}"
-    return Panel(figure, title, f"Peaks of |a_K| on {road}: {peaks}.", "")
+    return Panel(figure, title, f"Peaks of |a_K| on {road}: {peaks}.", f"Fidelity {shown[0].fidelity}.")
 
 
 def _window(time: Array, size: Array, span: float | None) -> tuple[float, float]:
@@ -89,8 +87,8 @@ def comfort_scale(context: ReportContext) -> Iterator[Panel]:
 
 
 def _scale_panel(context: ReportContext, road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
-    names = [context.rated.label(row) for row, _ in known]
-    figure, ax = axes(max(1.5 + 0.25 * len(known), _SCALE_HEIGHT_IN), names, key=0)
+    names = [f"{spelled(row.policy)}, {row.fidelity}" for row, _ in known]
+    figure, ax = axes("a_w [m/s²]", height=max(1.5 + 0.25 * len(known), _SCALE_HEIGHT_IN), labels=names, key=0)
     right = max(2.6, 1.15 * max(value for _, value in known))
     _reaction_bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
@@ -99,7 +97,6 @@ def _scale_panel(context: ReportContext, road: str, known: list[tuple[SummaryRow
     ax.set_yticks(range(len(known)), names)
     ax.set_ylim(-0.6, len(known) + 2.6)
     ax.set_xlim(0.0, right)
-    ax.set_xlabel("a_w [m/s²]")
     ax.grid(visible=False, axis="y")
     label = context.rated.road_label(road)
     values = "; ".join(f"{context.rated.label(row)}: {number(value)} m/s²" for row, value in known[::-1])
@@ -134,7 +131,7 @@ def exposure_chart(context: ReportContext) -> Iterator[Panel]:
 
 
 def _exposure_panel(context: ReportContext, road: str, cases: list[str]) -> Panel:
-    figure, ax = axes(3.3)
+    figure, ax = axes("frequency [Hz]", "acceleration, r.m.s. [m/s²]", height=3.3)
     _exposure_lines(ax)
     for ride in (ride for ride in context.rated.rides if ride.row.case in cases):
         parts = ride.components
@@ -142,8 +139,6 @@ def _exposure_panel(context: ReportContext, road: str, cases: list[str]) -> Pane
         colour, controlled = line_of(context, ride.row)
         label, marker = context.rated.label(ride.row), "s" if controlled else "o"
         ax.plot(parts.frequency[drawn], parts.rms[drawn], marker, color=colour, markersize=6.0, label=label, zorder=3)
-    ax.set_xlabel("frequency [Hz]")
-    ax.set_ylabel("acceleration, r.m.s. [m/s²]")
     legend(figure)
     title = f"Reduced comfort, {context.rated.road_label(road)}"
     alt = f"Components of the rides over {road} on the chart of reduced comfort of ISO 2631:1978."
@@ -177,14 +172,7 @@ _AROUND_IN = 0.75
 """Height around the lines of names [in]."""
 _LEAST_IN = 3.1
 """Height of a figure with few policies [in]."""
-_LEADER = {
-    "arrowstyle": "-",
-    "color": AXIS,
-    "linewidth": 0.5,
-    "relpos": (0.0, 0.5),
-    "shrinkA": 1.0,
-    "shrinkB": 2.0,
-}
+_LEADER = {"arrowstyle": "-", "color": AXIS, "linewidth": 0.5, "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 2.0}
 """From a name to its point."""
 
 
@@ -197,7 +185,9 @@ def trade_off(context: ReportContext) -> Iterator[Panel]:
 
 
 def _trade_off_panel(context: ReportContext, road: str, rows: Sequence[SummaryRow]) -> Panel:
-    figure, ax = axes(max(_AROUND_IN + _LINE_IN * len(rows), _LEAST_IN), ("0.00",), key=0, right=_NAMES_IN)
+    height = max(_AROUND_IN + _LINE_IN * len(rows), _LEAST_IN)
+    names = "wheel load, r.m.s. [N]", "a_w [m/s²]"
+    figure, ax = axes(*names, height=height, labels=("0.00",), key=0, right=_NAMES_IN)
     loads = np.array([row.rms_wheel_load_N for row in rows])
     comfort = np.array([context.rated.a_w(row) for row in rows])
     front = context.rated.pareto_front(rows)
@@ -207,8 +197,6 @@ def _trade_off_panel(context: ReportContext, road: str, rows: Sequence[SummaryRo
     edge = sorted((load, a_w) for row, load, a_w in zip(rows, loads, comfort, strict=True) if row in front)
     ax.step(*zip(*edge, strict=True), where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
     ax.margins(0.06)
-    ax.set_xlabel("wheel load, r.m.s. [N]")
-    ax.set_ylabel("a_w [m/s²]")
     _write_names(ax, context, rows, loads, comfort)
     values = "; ".join(
         f"{spelled(row.policy)} {amount(a_w, 'm/s2')} and {amount(load, 'N')}"

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from pzd.artefacts import ContinuousVelocityRow, ParameterRow, PeakVelocityRow
 from pzd.artefacts.csv_rows import Estimate
+from pzd.artefacts.identified import ContinuousVelocityRow, ParameterRow, PeakVelocityRow
 from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
 from pzd.report.blocks import amount, number, unit_of
@@ -35,10 +35,11 @@ def peak_velocity(context: ReportContext) -> Iterator[Panel]:
         return
     groups = _by_label(context, rows)
     labelled = any(groups)
-    figure, ax = axes(key=legend_lines(len(groups)) if labelled else 0)
+    figure, ax = axes("peak speed [m/s]", "force [kN]", key=legend_lines(len(groups)) if labelled else 0)
     for (label, mine), colour in zip(groups.items(), shades(len(groups)), strict=True):
         ax.plot([], [], color=colour, label=label or None)
-        for _, tests_of_condition in groupby(sorted(mine, key=lambda r: (str(_condition(r)), r.speed)), key=_condition):
+        ordered = sorted(mine, key=lambda row: (str(row.condition), row.speed))
+        for _, tests_of_condition in groupby(ordered, key=lambda row: row.condition):
             tests = list(tests_of_condition)
             for points in (_points(tests, "rebound"), _points(tests, "compression")):
                 ax.plot([v for v, _, _ in points], [f for _, f, _ in points], color=colour, linewidth=1.0)
@@ -46,8 +47,6 @@ def peak_velocity(context: ReportContext) -> Iterator[Panel]:
                     ax.plot(v, f, _MARKERS[kind], color=colour, markersize=4.0)
     ax.axhline(0.0, color=AXIS, linewidth=0.8)
     ax.set_xlim(left=0.0)
-    ax.set_xlabel("peak speed [m/s]")
-    ax.set_ylabel("force [kN]")
     if labelled:
         legend(figure, 4)
     by = f", one colour each for {', '.join(groups)}" if labelled else ""
@@ -72,15 +71,13 @@ def continuous_velocity(context: ReportContext) -> Iterator[Panel]:
     if not groups:
         return
     labelled = any(groups)
-    figure, ax = axes(key=legend_lines(len(groups)) if labelled else 0)
+    figure, ax = axes("velocity [m/s]", "force [kN]", key=legend_lines(len(groups)) if labelled else 0)
     cycles = [_fastest_test(rows) for rows in groups.values()]
     for label, cycle, colour in zip(groups, cycles, shades(len(groups)), strict=True):
         closed = [*cycle, cycle[0]]
         speeds, forces = [r.velocity_m_per_s for r in closed], [r.force_N / 1000.0 for r in closed]
         ax.plot(speeds, forces, color=colour, linewidth=1.2, label=label or None)
     ax.locator_params(axis="x", nbins=6)
-    ax.set_xlabel("velocity [m/s]")
-    ax.set_ylabel("force [kN]")
     if labelled:
         legend(figure, 4)
     tests = sorted({f"{amount(r[0].frequency_Hz, 'Hz')}, {number(1000.0 * r[0].amplitude_m)} mm" for r in cycles})
@@ -97,8 +94,8 @@ def continuous_velocity(context: ReportContext) -> Iterator[Panel]:
 def _fastest_test(rows: Sequence[ContinuousVelocityRow]) -> list[ContinuousVelocityRow]:
     """Return the cycle of the test with the largest speed, in its order."""
     top = max(rows, key=lambda row: abs(row.velocity_m_per_s))
-    same = (_condition(top), top.record, top.frequency_Hz, top.amplitude_m)
-    return [row for row in rows if (_condition(row), row.record, row.frequency_Hz, row.amplitude_m) == same]
+    same = (top.condition, top.record, top.frequency_Hz, top.amplitude_m)
+    return [row for row in rows if (row.condition, row.record, row.frequency_Hz, row.amplitude_m) == same]
 
 
 def _by_label(context: ReportContext, rows: Sequence[Row]) -> Mapping[str, list[Row]]:
@@ -109,10 +106,6 @@ def _by_label(context: ReportContext, rows: Sequence[Row]) -> Mapping[str, list[
         label = context.voltage(context.tests.nearest_level(row.voltage_V)) if controlled else row.setting or ""
         found.setdefault(label, []).append(row)
     return found
-
-
-def _condition(row: PeakVelocityRow | ContinuousVelocityRow) -> tuple[str | None, float | None, float | None]:
-    return row.setting, row.voltage_V, row.temperature_degC
 
 
 # --- The final damper ---
@@ -126,7 +119,8 @@ def parameters(context: ReportContext) -> Iterator[Panel]:
         return
     temperatures = sorted({row.temperature_degC for row in final}, key=lambda t: t or 0.0)
     for quantity in (FRICTION, DAMPING, STIFFNESS):
-        figure, ax = axes(2.6, key=int(len(temperatures) > 1))
+        labels = f"{context.control.name} [{context.control.unit}]", f"{quantity.symbol} [k{unit_of(quantity.unit)}]"
+        figure, ax = axes(*labels, height=2.6, key=int(len(temperatures) > 1))
         for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):
             known = sorted(
                 (row.voltage_V, *_with_whiskers(row, quantity.column))
@@ -139,8 +133,6 @@ def parameters(context: ReportContext) -> Iterator[Panel]:
                 x, y, below, above = zip(*known, strict=True)
                 label = amount(temperature, "degC") if temperature is not None else None
                 ax.errorbar(x, y, yerr=(below, above), fmt="o-", color=colour, capsize=3.0, markersize=4.0, label=label)
-        ax.set_xlabel(f"{context.control.name} [{context.control.unit}]")
-        ax.set_ylabel(f"{quantity.symbol} [k{unit_of(quantity.unit)}]")
         margin = 0.05 * (max(voltages) - min(voltages))
         ax.set_xlim(min(voltages) - margin, max(voltages) + margin)
         ax.margins(y=0.15)
@@ -167,7 +159,7 @@ def force(context: ReportContext) -> Iterator[Panel]:
         return
     rows = [row for row in context.table.force if row.temperature_degC == temperatures[0] and row.force_N is not None]
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
-    figure, ax = axes(key=legend_lines(len(voltages)) if context.controlled else 0)
+    figure, ax = axes("velocity [m/s]", "force [kN]", key=legend_lines(len(voltages)) if context.controlled else 0)
     for voltage, colour in zip(voltages, shades(len(voltages)), strict=True):
         points = np.array([(r.velocity_m_per_s, r.force_N, r.inside) for r in rows if r.voltage_V == voltage])
         points[:, 1] += context.damper.static_force(voltage)
@@ -175,8 +167,6 @@ def force(context: ReportContext) -> Iterator[Panel]:
         ax.plot(points[:, 0], points[:, 1] / 1000.0, color=colour, linewidth=1.0, linestyle=":")
         ax.plot(points[:, 0], inside, color=colour, label=None if voltage is None else context.voltage(voltage))
     ax.locator_params(axis="x", nbins=6)
-    ax.set_xlabel("velocity [m/s]")
-    ax.set_ylabel("force [kN]")
     if context.controlled:
         legend(figure, 4)
     at = f" at {amount(temperatures[0], 'degC')}" if temperatures[0] is not None else ""

@@ -9,7 +9,7 @@ import numpy as np
 from pzd.record import Array, Record
 from pzd.report.blocks import number
 from pzd.report.context import ReportContext
-from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend
+from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend, shortened
 from pzd.report.rig_tests import settled
 from pzd.signals.measures import criterion
 
@@ -31,7 +31,7 @@ def held_out_gap(context: ReportContext) -> Iterator[Panel]:
     before = ("before" if extended else "simple model", gap.before, BASELINE)
     bars = [noise, after, before] if extended else [noise, before]
     last = bars[1]
-    figure, ax = axes(1.0 + 0.4 * len(bars), [bar[0] for bar in bars], key=0)
+    figure, ax = axes("W_s on held-out data [-]", height=1.0 + 0.4 * len(bars), labels=[bar[0] for bar in bars], key=0)
     ax.barh([b[0] for b in bars], [b[1] for b in bars], color=[b[2] for b in bars], height=0.6)
     whisker = [_NORMAL_95 * gap.standard_error]
     ax.errorbar([last[1]], [last[0]], xerr=whisker, color="black", capsize=3.0, linewidth=1.0)
@@ -39,7 +39,7 @@ def held_out_gap(context: ReportContext) -> Iterator[Panel]:
         lift = 8 if bar is last else 0  # clear of the whisker
         ax.annotate(number(bar[1]), (bar[1], i), (6, lift), textcoords="offset points", va="center")
     ax.set_xlim(0.0, 1.3 * max(bar[1] for bar in bars) or 1.0)
-    ax.set_xlabel("W_s on held-out data [-]")
+    ax.locator_params(axis="x", nbins=4)
     ax.grid(visible=False, axis="y")
     figures = ", ".join(f"{name} {number(value)}" for name, value, _ in reversed(bars))
     alt = f"W_s on held-out data: {figures}."
@@ -55,14 +55,15 @@ def held_out_records(context: ReportContext) -> Iterator[Panel]:
     records = [record for record in context.tests.records if record.name in held_out][:_MOST_RECORDS][::-1]
     if not records:
         return
-    names = [record.name for record in records]
+    names = [shortened(record.name) for record in records]
     before, after = np.array([record_gap(context, record) for record in records]).T
-    figure, ax = axes(1.0 + 0.26 * max(len(names), 3), names)
-    ax.hlines(names, after, before, color=MUTED, linewidth=2.0)
-    ax.plot(before, names, "o", color=BASELINE, label="before")
-    ax.plot(after, names, "s", color=FINAL, label="after")
+    figure, ax = axes("W_s [-]", height=1.0 + 0.26 * max(len(names), 3), labels=names)
+    lines = range(len(names))
+    ax.hlines(lines, after, before, color=MUTED, linewidth=2.0)
+    ax.plot(before, lines, "o", color=BASELINE, label="before")
+    ax.plot(after, lines, "s", color=FINAL, label="after")
+    ax.set_yticks(lines, names)
     ax.set_xlim(0.0, 1.1 * float(max(before.max(), after.max())))
-    ax.set_xlabel("W_s [-]")
     ax.margins(y=0.25)
     legend(figure)
     alt = f"W_s of {len(names)} held-out records; it falls in {int(np.sum(after < before))} of them."
@@ -140,11 +141,11 @@ def _rms_maps(context: ReportContext, groups: list[list[Record]], edges: Array) 
 def _map_panel(
     context: ReportContext, groups: dict[str, list[Record]], edges: Array, values: Array, top: float, damper: str
 ) -> Panel:
-    figure, ax = axes(1.5 + 0.3 * max(len(groups), 4), groups, key=0, right=0.75)
+    height = 1.5 + 0.3 * max(len(groups), 4)
+    figure, ax = axes("velocity [m/s]", height=height, labels=groups, key=0, right=0.75)
     rows = np.arange(len(groups) + 1)
     mesh = ax.pcolormesh(edges, rows, values, cmap=MAP, vmin=0.0, vmax=top, edgecolors="face", linewidth=0.9)
     ax.set_yticks(np.arange(len(groups)) + 0.5, list(groups))
-    ax.set_xlabel("velocity [m/s]")
     ax.grid(visible=False)
     box = ax.get_position()
     bar = figure.add_axes((box.x1 + 0.02, box.y0, 0.025, box.height))
@@ -168,11 +169,11 @@ def ranking(context: ReportContext) -> Iterator[Panel]:
     ranked = diagnosis.ranking[:_MOST_CANDIDATES][::-1]
     if not ranked:
         return
-    figure, ax = axes(1.0 + 0.26 * max(len(ranked), 3), [r.effect for r in ranked])
+    names, height = [r.effect for r in ranked], 1.0 + 0.26 * max(len(ranked), 3)
+    figure, ax = axes("W_s left on the tests seen [-]", height=height, labels=names)
     colours = [FINAL if r.effect in diagnosis.effects else MUTED for r in ranked]
-    ax.barh([r.effect for r in ranked], [r.gap_after for r in ranked], color=colours, height=0.62)
+    ax.barh(names, [r.gap_after for r in ranked], color=colours, height=0.62)
     ax.locator_params(axis="x", nbins=4)
-    ax.set_xlabel("W_s left on the tests seen [-]")
     ax.grid(visible=False, axis="y")
     ax.grid(color=GRID, axis="x")
     alt = f"What each candidate leaves of the gap; best: {ranked[-1].effect}, W_s {ranked[-1].gap_after:.3g}."

@@ -35,14 +35,11 @@ def _loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qu
     baseline, final = context.damper.simulated(record)
     part = context.tests.middle(record)
     x, measured, baseline, final = thinned(abscissa[part], record.force[part], baseline[part], final[part])
-    figure, ax = axes()
+    figure, ax = axes(f"{quantity.name} [{'mm' if quantity == DISPLACEMENT else quantity.unit}]", "force [kN]")
     ax.plot(x, measured / 1000.0, ".", color=MEASURED, markersize=2.4, label="measured")
     ax.plot(x, baseline / 1000.0, color=BASELINE, linestyle="--", label=context.damper.baseline_name)
     if context.damper.extended:
         ax.plot(x, final / 1000.0, color=FINAL, label="with what was missing")
-    unit = "mm" if quantity == DISPLACEMENT else quantity.unit
-    ax.set_xlabel(f"{quantity.name} [{unit}]")
-    ax.set_ylabel("force [kN]")
     legend(figure)
     title, name = f"{FORCE.name} over {quantity.name}", context.tests.conditions(record)
     extended = " and the extended one" if context.damper.extended else ""
@@ -50,7 +47,4 @@ def _loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qu
     return Panel(figure, f"{title[0].upper()}{title[1:]}, {name}", alt, f"Record {record.name}.")
 
 
-PLOTS = (
-    Plot("force_velocity", "model", 0, force_velocity),
-    Plot("force_displacement", "model", 1, force_displacement),
-)
+PLOTS = (Plot("force_velocity", "model", 0, force_velocity), Plot("force_displacement", "model", 1, force_displacement))

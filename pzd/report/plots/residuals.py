@@ -40,7 +40,10 @@ def hypothesis(context: ReportContext) -> Iterator[Panel]:
     groups = [(voltage, list(mine)) for voltage, mine in groupby(points, key=lambda p: p.voltage_V)]
     labelled = len(groups) > 1
     largest = max(abs(p.left_N) + p.scatter_N for p in points)
-    figure, ax = axes(labels=(f"-{largest:.0f}",), key=legend_lines(len(groups)) if labelled else 0)
+    first = points[0]
+    lines = legend_lines(len(groups)) if labelled else 0
+    horizontal = f"{first.argument} [{first.unit}]"
+    figure, ax = axes(horizontal, "what is left [N]", labels=(f"-{largest:.0f}",), key=lines)
     for (voltage, mine), colour in zip(groups, shades(len(groups)), strict=True):
         x, residual, scatter = ([getattr(p, name) for p in mine] for name in ("value", "left_N", "scatter_N"))
         label = context.voltage(voltage) if voltage is not None else f"moving {context.control.name}"
@@ -48,9 +51,6 @@ def hypothesis(context: ReportContext) -> Iterator[Panel]:
         ax.plot(x, [p.fitted_N for p in mine], color=FINAL, linewidth=1.5)
     ax.axhline(0.0, color=AXIS, linewidth=0.8)
     ax.locator_params(axis="x", nbins=5)
-    first = points[0]
-    ax.set_xlabel(f"{first.argument} [{first.unit}]")
-    ax.set_ylabel("what is left [N]")
     if labelled:
         legend(figure, 4)
     peak = max(points, key=lambda p: abs(p.fitted_N))
@@ -59,8 +59,8 @@ def hypothesis(context: ReportContext) -> Iterator[Panel]:
         f"{number(peak.value)} {first.unit}."
     )
     caption = (
-        "Dots: mean and standard deviation of samples of one class, less what T0, C, k, the effects adopted and each "
-        "test's own offset, gain and delay take up. Line: the hypothesis, which is adopted nowhere."
+        "Dots: mean and standard deviation of the samples of one class, with T0, C, k, the adopted effects and each "
+        "test's own offset, gain and delay projected out. Line: the hypothesis, which is adopted nowhere."
     )
     yield Panel(figure, f"Hypothesis: what is left, as c {first.shape}", alt, caption)
 
@@ -170,15 +170,13 @@ def spectrum(context: ReportContext) -> Iterator[Panel]:
 
 def _spectrum_panel(context: ReportContext, name: str, records: Sequence[Record]) -> Panel:
     middles, before, after, noise = spectra(context, records)
-    figure, ax = axes(labels=("10^-0",), key=1)
+    figure, ax = axes("frequency [Hz]", "r.m.s. of what is left [N]", labels=("10^-0",))
     curves = [(context.damper.baseline_name, before, BASELINE, "-")]
     curves += [("with what was added", after, FINAL, "-")] if context.damper.extended else []
     curves += [("from cycle to cycle", noise, MEASURED, "--")] if np.any(noise > 0.0) else []
     for label, values, colour, style in curves:
         positive = values > 0.0  # a logarithmic axis has no 0
         ax.loglog(middles[positive], values[positive], style, color=colour, label=label)
-    ax.set_xlabel("frequency [Hz]")
-    ax.set_ylabel("r.m.s. of what is left [N]")
     legend(figure)
     last = after if context.damper.extended else before
     most = int(np.argmax(last))
@@ -244,7 +242,7 @@ def normal_quantiles(context: ReportContext) -> Iterator[Panel]:
     """Draw the quantiles of the residual over those of a normal distribution."""
     if not _unexplained(context):
         return
-    figure, ax = axes()
+    figure, ax = axes("quantile of a normal distribution", "of what is left, over its r.m.s.")
     curves = [(context.damper.baseline_name, 0, BASELINE)]
     curves += [("with what was added", 1, FINAL)] * context.damper.extended
     for label, damper, colour in curves:
@@ -252,13 +250,11 @@ def normal_quantiles(context: ReportContext) -> Iterator[Panel]:
         ax.plot(normal, found, color=colour, label=label)
     line = [float(normal[0]), float(normal[-1])]
     ax.plot(line, line, "--", color=MEASURED, label="normal")
-    ax.set_xlabel("quantile of a normal distribution")
-    ax.set_ylabel("of what is left, over its r.m.s.")
     legend(figure)
     ends = f"from {number(found[0])} to {number(found[-1])}"
     alt = f"Quantiles of measured minus simulated force against a normal distribution: {ends}."
     caption = (
-        "On the dashed line it is spread as chance spreads it; long ends are rare large misses, as jumps leave them."
+        "On the dashed line the residual is normally distributed; long ends are rare large residuals, as jumps leave."
     )
     yield Panel(figure, "How what is left is spread", alt, caption)
 

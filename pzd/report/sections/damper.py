@@ -10,17 +10,7 @@ from pzd.artefacts import ForceRow
 from pzd.damper.confounders import known
 from pzd.quantities import VOLTAGE
 from pzd.report import tables
-from pzd.report.blocks import (
-    Block,
-    Notes,
-    Paragraph,
-    Pictures,
-    Section,
-    TextTable,
-    amount,
-    galleries,
-    listed,
-)
+from pzd.report.blocks import Block, Notes, Paragraph, Pictures, Section, TextTable, amount, galleries, listed
 from pzd.report.columns import Beyond, Cell, Column, Span, Table
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
@@ -71,7 +61,7 @@ def _knee_blocks(context: ReportContext) -> Iterator[Block]:
 def _parameters(context: ReportContext) -> TextTable:
     """Return T0, C and k of the damper that everything behind uses."""
     title = (
-        "T0, C and k beside what was missing" if context.damper.extended else "T0, C and k of the Bingham element alone"
+        "T0, C and k of the adopted damper" if context.damper.extended else "T0, C and k of the Bingham element alone"
     )
     title = "T0, C and k beside the knee, C the mean bleed of both directions" if context.damper.fitted_law else title
     return tables.parameters(context.damper.final_parameters, context.control, title).without("setting").block()
@@ -136,7 +126,7 @@ def _settings_blocks(context: ReportContext) -> Iterator[Block]:
     )
     yield Paragraph(
         "The settings below were not tested. Their force is interpolated, linear in the number of the setting, between "
-        "the tested ones to either side, each as identify hands it on, and only where both were tested: "
+        "the tested ones to either side, each by its adopted law, and only where both were tested: "
         f"4-table/settings.csv holds all of it. {trust}"
     )
     yield tables.interpolated_settings(found.settings, context.control).block()
@@ -157,7 +147,7 @@ def _responses(context: ReportContext) -> TextTable:
             Column("velocity_m_per_s", "speed", "m/s"),
             Column("to_63_percent_s", "to 63 %", "ms", factor=1000.0),
             Column("to_90_percent_s", "to 90 %", "ms", factor=1000.0),
-            Column("note", ""),
+            Column("note", "note", optional=True),
         ),
         context.rides.responses,
         tables.FOLD,

@@ -51,10 +51,10 @@ def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
 
 def _gap(gap: Gap | None) -> str:
     if gap is None:
-        return "How far it misses the measured force could not be measured."
+        return "Its error on data that no fit has seen could not be measured."
     return (
         f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
-        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the model misses "
+        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the residual is "
         f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
     )
 
@@ -111,7 +111,7 @@ def _gap_closed(diagnosis: Diagnosis) -> str:
         return ""
     left = f"standard error {number(gap.standard_error, 2)}, noise alone {number(gap.noise_floor)}"
     if gap.after == gap.before:
-        text = f"The model is handed on unchanged: W_s on held-out data is {number(gap.before)} ({left})."
+        text = f"The model stays as it is: W_s on held-out data is {number(gap.before)} ({left})."
     else:
         cut = percent(1.0 - gap.after / gap.before) if gap.before > 0.0 else DASH
         text = f"On held-out data W_s goes from {number(gap.before)} to {number(gap.after)} ({left}): {cut} less."
@@ -157,17 +157,17 @@ def _hypothesis_blocks(found: Hypotheses) -> tuple[Block, ...]:
     if not found.sought:
         return ()
     if not found.rows:
-        return (Paragraph("No shape of what is left predicts tests kept back better beyond two standard errors."),)
+        return (Paragraph("No shape of what is left predicts held-out tests better by more than two standard errors."),)
     best = found.alone[0]
     return (
         Paragraph(
             f"A hypothesis on what is left: c {best.shape}, {best.physics}. It would close {percent(best.closes)} of "
-            "the gap on tests kept back. It is adopted nowhere: what has this shape may be something else."
+            "the gap on held-out tests. It is adopted nowhere: what has this shape may be something else."
         ),
         Table(
             "Shapes of what is left, each by itself, and below beside the best",
             (
-                Column("shape", "shape", value=_shape),
+                Column("shape", "shape", value=lambda r: ", beside ".join(filter(None, (f"c {r.shape}", r.beside)))),
                 Column("coefficient", "coefficient (95 % interval)", value=_coefficient),
                 Column("parameter", "searched", value=_searched),
                 tables.share("closes", "gap closed"),
@@ -177,10 +177,6 @@ def _hypothesis_blocks(found: Hypotheses) -> tuple[Block, ...]:
             found.rows,
         ).block(),
     )
-
-
-def _shape(row: HypothesisRow) -> str:
-    return f"c {row.shape}" if row.beside is None else f"c {row.shape}, beside {row.beside}"
 
 
 def _coefficient(row: HypothesisRow) -> str | Quantity:

@@ -30,7 +30,7 @@ from pzd.report.context import ReportContext
 from pzd.report.ride_comfort import REALISTIC
 from pzd.simulate.config import Sensors, SimulateConfig
 from pzd.simulate.policies import policies
-from pzd.simulate.vehicle.car import HalfCar, modes
+from pzd.simulate.vehicle.car import modes
 
 _FIDELITIES = {
     "ideal": "the demanded force is there at once",
@@ -75,7 +75,8 @@ def _ride(context: ReportContext) -> str:
     springs = " and ".join(number(k / 1000.0) for k in car.stiffnesses)
     wheels = ""
     if car.wheels_have_mass:
-        masses, tyres = (listed([number(v) for v in pair]) for pair in (car.unsprung_masses, _tyres(car)))
+        masses = listed([number(mass) for mass in car.unsprung_masses])
+        tyres = listed([number(k / 1000.0) for k in car.tyre_stiffnesses])
         wheels = f", wheels of {masses} kg on tyres of {tyres} kN/m"
     return (
         f"A half-car ({car.name}: {amount(car.mass, 'kg', 4)}, springs {springs} kN/m, wheelbase "
@@ -83,11 +84,6 @@ def _ride(context: ReportContext) -> str:
         f"{amount(abs(car.comfort_point), 'm')} {'behind' if car.comfort_point > 0.0 else 'ahead of'} the centre of "
         f"gravity. {' '.join(_windows(context))}"
     )
-
-
-def _tyres(car: HalfCar) -> tuple[float, float]:
-    """Return the stiffness of the tyres of each axle [kN/m]."""
-    return car.tyre_stiffnesses[0] / 1000.0, car.tyre_stiffnesses[1] / 1000.0
 
 
 def _windows(context: ReportContext) -> Iterator[str]:
@@ -172,24 +168,24 @@ def _compared(context: ReportContext) -> Iterator[Block]:
         return
     policy = pairs[0][0].policy
     yield Paragraph(
-        f"The policy {policy} is set beside the others on the same road and at the same fidelity. What the best of "
-        "the others hold was searched for on each road and at each fidelity, so that a_w is least."
+        f"The policy {policy} is compared with the others on the same road and at the same fidelity. What the "
+        "best of the others hold constant was searched for on each road and at each fidelity, for the least a_w."
     )
 
     def changed(name: str, head: str, value: Callable[[SummaryRow], float]) -> Column:
         return Column(name, head, value=lambda pair: change(value(pair[1]), value(pair[0])))
 
     yield Table(
-        f"{policy} beside the others at the same fidelity (a_w: ISO 2631-1:1997)",
+        f"The policy {policy} compared with the others at the same fidelity (a_w: ISO 2631-1:1997)",
         (
             Column("road", "road", value=lambda pair: pair[0].road),
             Column("fidelity", "fidelity", value=lambda pair: pair[0].fidelity),
-            Column("beside", "beside", value=lambda pair: context.rated.policy_label(pair[1])),
+            Column("beside", "compared with", value=lambda pair: context.rated.policy_label(pair[1])),
             Column("a_w", f"a_w {policy}", "m/s2", lambda pair: context.rated.a_w(pair[0])),
             Column("a_w_other", "a_w of the other", "m/s2", lambda pair: context.rated.a_w(pair[1])),
-            changed("a_w_change", "a_w", context.rated.a_w),
-            changed("load_change", "wheel load", lambda row: row.rms_wheel_load_N),
-            changed("travel_change", "travel", lambda row: row.peak_deflection_m),
+            changed("a_w_change", "change of a_w", context.rated.a_w),
+            changed("load_change", "of wheel load", lambda row: row.rms_wheel_load_N),
+            changed("travel_change", "of travel", lambda row: row.peak_deflection_m),
         ),
         pairs,
     ).block()
@@ -218,7 +214,8 @@ def _trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Bl
         "the road. Square: the policy that the rest of this page is about; triangles: others that control; circles: "
         "what is held. The dotted line joins those that none beats in both:"
     )
-    yield Notes(tuple(f"{road}, {rows[0].fidelity}: {_names(context, rows)}" for road, rows in shown.items()))
+    fronts = {road: listed([spelled(row.policy) for row in context.rated.pareto_front(shown[road])]) for road in shown}
+    yield Notes(tuple(f"{road}, {rows[0].fidelity}: {fronts[road]}" for road, rows in shown.items()))
     found = tuple(text for road, rows in shown.items() if (text := _best_found(context, road, rows)))
     if found:
         own = context.simulate.best_found
@@ -230,10 +227,6 @@ def _trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Bl
         yield Notes(found)
     yield from galleries(pictures["policies"])
     yield _all_policies(context, tuple(shown))
-
-
-def _names(context: ReportContext, rows: tuple[SummaryRow, ...]) -> str:
-    return listed([spelled(row.policy) for row in context.rated.pareto_front(rows)])
 
 
 def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...]) -> str:
@@ -284,10 +277,17 @@ def _all_policies(context: ReportContext, roads: tuple[str, ...]) -> TextTable:
 # --- Tables of all rides ---
 
 
+def _by_ride(context: ReportContext, of: Callable[[Any], SummaryRow] = lambda row: row) -> tuple[Column, Column]:
+    """Return the columns that tell rides apart: the road, and what drove the dampers."""
+    return (
+        Column("road", "road", value=lambda row: of(row).road),
+        Column("dampers", "dampers", value=lambda row: context.rated.label(of(row))),
+    )
+
+
 def _of_rides(context: ReportContext, title: str, *columns: Column) -> TextTable:
-    """Return a table of all rides, each by its road and what drove the dampers."""
-    by = (Column("road", "road"), Column("dampers", "dampers", value=context.rated.label))
-    return Table(title, (*by, *columns), _all(context)).block()
+    """Return a table of all rides."""
+    return Table(title, (*_by_ride(context), *columns), _all(context)).block()
 
 
 def _measure(
@@ -343,8 +343,7 @@ def _wheels(context: ReportContext) -> TextTable:
     return Table(
         f"Force between wheel and road: {made}{at}",
         (
-            Column("road", "road", value=lambda pair: pair[0].road),
-            Column("dampers", "dampers", value=lambda pair: context.rated.label(pair[0])),
+            *_by_ride(context, lambda pair: pair[0]),
             *(
                 Column(f"min_{n}_N", f"least force, axle {wheel.axle}", "N", of_axle(n, "min_contact_force_N"))
                 for n, wheel in enumerate(axles)
@@ -362,7 +361,7 @@ def _modes(context: ReportContext) -> TextTable:
     """Return the modes of the car on dampers of the constant c."""
     c = context.simulate.constant_damping_Ns_per_m
     return Table(
-        f"How the car swings by itself, with c = {amount(c, 'N s/m')} at each axle and the wheels on the road",
+        f"Modes of the car, with c = {amount(c, 'N s/m')} at each axle and the wheels on the road",
         (
             Column("name", "motion"),
             Column("frequency_Hz", "undamped frequency", "Hz"),
@@ -420,8 +419,7 @@ def _worth(context: ReportContext) -> Iterator[Block]:
     yield Table(
         "With and without the missing effect (time: reduced comfort)",
         (
-            Column("road", "road", value=lambda pair: pair[1].road),
-            Column("dampers", "dampers", value=lambda pair: context.rated.label(pair[1])),
+            *_by_ride(context, lambda pair: pair[1]),
             *both("peak", "m/s2", lambda row: row.peak_abs_aK_m_per_s2),
             *both("a_w", "m/s2", lambda row: context.rated.value(row.case, "a_w")),
             *both("time", "min", lambda row: context.rated.value(row.case, COMFORT_TIME), words=minutes),
