@@ -27,7 +27,7 @@ demo: $(RUNTIME)  ## Install pzd into .venv, run configs/quickstart.yaml, say wh
 
 .PHONY: test
 test: $(DEV)  ## Run the tests on fixed draws, but for those that build and install the whole or take long
-	$(BIN)/python -m pytest -n $(JOBS) -m "not ci" --durations 10
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m "not ci" --durations 10
 
 .PHONY: check
 check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
@@ -41,7 +41,7 @@ ci: check  ## What a merge must pass besides `make test`: check, every config, t
 
 .PHONY: coverage
 coverage: $(DEV)  ## As `make test`, and print how many lines and branches of each module it runs; takes longer
-	$(BIN)/python -m pytest -n $(JOBS) -m "not ci" --cov --cov-report=term
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m "not ci" --cov --cov-report=term
 
 .PHONY: fresh
 fresh: $(DEV)  ## Run the tests that draw on N=20 new seeds, repeat what failed, print seed and rate per test

@@ -750,34 +750,40 @@ def test_every_command_explains_itself(typed: Terminal, command: str) -> None:
     assert typed.out[0].startswith(f"Usage: pzd {command} ")
 
 
-def test_help_imports_neither_numbers_nor_what_checks_them() -> None:
-    text = (
-        "import sys\nfrom pzd.cli.app import status\nstatus(['--help'])\n"
-        f"print([name for name in {(*HEAVY, 'numpy', 'pydantic', 'yaml')!r} if name in sys.modules], file=sys.stderr)"
-    )
+IMPORTING = """
+import json, sys
+from types import SimpleNamespace as S
+
+def tell(step, *more):
+    loaded = [name for name in (*{heavy!r}, *more) if name in sys.modules]
+    print(json.dumps([step, loaded]), file=sys.stderr)
+
+from pzd.cli.app import status
+status(['--help'])
+tell('help', 'numpy', 'pydantic', 'yaml')
+
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+assert {{'bouc_wen', 'cavitation', 'frame_compliance'}} <= set(library())
+base = ({{'T0_N': 300, 'C_Ns_per_m': 2500, 'k_N_per_m': 2e5}},)
+Damper(base=base, effects={{'gas_spring': {{'k_g': 1000}}}})
+tell('a config that names effects')
+
+from pzd.pipeline.stages import stages
+import pzd.pipeline.command, pzd.rig.files.reading
+stages(S(rig=S(virtual=None), car=True))
+tell('all is fresh')
+"""
+"""What is loaded after each of three steps of one process, the lightest first."""
+
+
+def test_nothing_heavy_is_imported_for_help_nor_to_read_effects_nor_to_find_that_all_is_fresh() -> None:
+    """Help imports neither numbers nor what checks them, and reading a config that names effects compiles no law."""
+    text = IMPORTING.format(heavy=HEAVY)
     printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
-    assert printed.stderr == "[]\n"
-
-
-def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
-    text = (
-        "import sys\nfrom pzd.pipeline.stages import stages\nfrom types import SimpleNamespace as S\n"
-        "import pzd.pipeline.command, pzd.rig.files.reading\nstages(S(rig=S(virtual=None), car=True))\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules])"
-    )
-    printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
-    assert printed.stdout == "[]\n", printed.stderr
-
-
-def test_no_law_is_compiled_to_read_a_config_that_names_effects() -> None:
-    text = (
-        "import sys\nfrom pzd.damper.effects import library\nfrom pzd.damper.model import Damper\n"
-        "assert {'bouc_wen', 'cavitation', 'frame_compliance'} <= set(library())\n"
-        "Damper(base=({'T0_N': 300, 'C_Ns_per_m': 2500, 'k_N_per_m': 2e5},), effects={'gas_spring': {'k_g': 1000}})\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules])"
-    )
-    printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
-    assert printed.stdout == "[]\n", printed.stderr
+    assert printed.returncode == 0, printed.stderr
+    told = [json.loads(line) for line in printed.stderr.splitlines()]
+    assert told == [["help", []], ["a config that names effects", []], ["all is fresh", []]]
 
 
 def test_a_closed_pipe_is_quiet() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import typer
+from parsed import tree
 from typer.core import TyperGroup, TyperOption
 
 import pzd
@@ -199,9 +200,9 @@ def test_headings_that_a_page_links_to_exist(name: str) -> None:
 def public() -> Iterator[tuple[str, Function | ast.ClassDef, ast.ClassDef | None]]:
     """Place, node and class of every public function, method and class."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        scopes: list[tuple[ast.Module | ast.ClassDef, ast.ClassDef | None]] = [(tree, None)]
-        scopes += [(node, node) for node in tree.body if isinstance(node, ast.ClassDef)]
+        module = tree(path)
+        scopes: list[tuple[ast.Module | ast.ClassDef, ast.ClassDef | None]] = [(module, None)]
+        scopes += [(node, node) for node in module.body if isinstance(node, ast.ClassDef)]
         for scope, owner in scopes:
             for node in scope.body:
                 if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("_"):

@@ -44,7 +44,7 @@ def made(folder: Path, *files: str) -> None:
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """A folder with a copy of the package."""
-    shutil.copytree(Path(pzd.__file__).parent, tmp_path / "pzd", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(pzd.__file__).parent, tmp_path / "pzd")  # with its bytecode, which takes long to make
     return tmp_path
 
 

@@ -19,6 +19,7 @@ from installed import Installed
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
+from parsed import tree
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -111,7 +112,7 @@ def test_every_locked_version_runs_on_every_supported_python() -> None:
 def imported(module: Path) -> set[str]:
     """The top-level names that a module imports, wherever in the file."""
     found = set()
-    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import stub_stages
+from parsed import tree
 from stub_stages import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Identified, Manifest, Rig
@@ -309,7 +310,7 @@ def executed_imports(tree: ast.Module) -> Iterator[str]:
 def test_no_import_is_missed() -> None:
     for path in sorted(PACKAGE.rglob("*.py")):
         name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
-        imports = set(executed_imports(ast.parse(path.read_text(encoding="utf-8"))))
+        imports = set(executed_imports(tree(path)))
         modules = {one if _file(one, PACKAGE) else one.rpartition(".")[0] for one in imports if one.startswith("pzd.")}
         assert modules - {name, "pzd"} <= _imports_of(name, PACKAGE), name
 

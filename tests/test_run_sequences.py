@@ -237,7 +237,7 @@ def _killer(home: Path, at: int, *, torn: bool) -> Any:
 
 
 FEW = settings(
-    max_examples=10,
+    max_examples=6,
     stateful_step_count=10,
     derandomize=True,
     database=None,

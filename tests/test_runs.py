@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import multiprocessing
 import os
 import shutil
-import signal
-import subprocess
-import sys
 import threading
 import time
+import warnings
+from multiprocessing.context import ForkProcess
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,6 @@ from pzd.runs.folder import MANIFEST
 from pzd.schema.errors import ConfigError, FilesError
 
 CONTROL = Control()
-HERE = Path(__file__).resolve().parent
 
 
 def identified(level: float) -> Identified:
@@ -126,44 +126,44 @@ def test_runs_below_a_file_are_a_fault_of_files(tmp_path: Path) -> None:
         pass
 
 
-WRITER = """
-import sys, time
-from pathlib import Path
-sys.path[:0] = [{here!r}, {root!r}]
-from test_runs import CONTROL, identified
-from pzd.artefacts import Identified
-from pzd.runs import Run
-
 class Slow:
+    """An artefact that stands half written for a minute, and says so."""
+
     folder = Identified.folder
-    def write(self, folder, control):
+
+    def __init__(self, told: Event) -> None:
+        self.told = told
+
+    def write(self, folder: Path, control: Control) -> None:
         identified(4.0).write(folder, control)
         (folder / "parameters.csv").write_text("half")
-        print("writing", flush=True)
+        self.told.set()
         time.sleep(60)
 
-run = Run.of(Path({config!r}), Path({runs!r}), CONTROL)
-with run.locked("pzd identify"):
-    if {hold!r}:
-        print("writing", flush=True)
-        time.sleep(60)
-    run.write("identify", Slow(), {{}}, "key", (), 0.5)
-"""
+
+def write_slowly(run: Run, told: Event, *, hold: bool) -> None:
+    with run.locked("pzd identify"):
+        if hold:
+            told.set()
+            time.sleep(60)
+        run.write("identify", Slow(told), {}, "key", (), 0.5)  # type: ignore[arg-type]  # stands for an artefact
 
 
-def other_process(run: Run, *, hold: bool) -> subprocess.Popen[str]:
-    text = WRITER.format(
-        here=str(HERE), root=str(HERE.parent), config=str(run.config), runs=str(run.folder.parent), hold=hold
-    )
-    process = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, cwd=HERE.parent)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "writing\n"
+def other_process(run: Run, *, hold: bool) -> ForkProcess:
+    """A process that writes half of a result, or holds the run; forked, since a new one takes long to start."""
+    forking = multiprocessing.get_context("fork")
+    told = forking.Event()
+    process = forking.Process(target=write_slowly, args=(run, told), kwargs={"hold": hold}, daemon=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which the child does not need
+        process.start()
+    assert told.wait(60.0)
     return process
 
 
-def end(process: subprocess.Popen[str]) -> None:
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
+def end(process: ForkProcess) -> None:
+    process.kill()
+    process.join()
 
 
 def test_a_run_killed_in_the_middle_of_writing_leaves_the_old_result(run: Run) -> None:

@@ -140,7 +140,9 @@ def watching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Watch
             running.wait()
 
 
-def test_a_new_file_a_mistake_and_its_mending(watching: Watching, tmp_path: Path) -> None:
+def test_a_new_file_a_mistake_its_mending_and_ctrl_c(
+    watching: Watching, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     report = "report: runs/first/6-report/report.html"
     first = watching.until(report)
     assert first[0] == "watching first.yaml and the files that it names; Ctrl-C ends it"
@@ -167,11 +169,6 @@ def test_a_new_file_a_mistake_and_its_mending(watching: Watching, tmp_path: Path
     (tmp_path / "data" / "c.csv").unlink()
     assert watching.until(report)[0] == "data/c.csv: gone"
 
-
-def test_ctrl_c_ends_it_and_the_next_run_goes_on(
-    watching: Watching, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    watching.until("report: runs/first/6-report/report.html")
     watching.running.send_signal(signal.SIGINT)
     assert watching.running.wait(timeout=PATIENCE_S) == 130
     assert watching.until("left what was there before")[-1].startswith("interrupted; ")

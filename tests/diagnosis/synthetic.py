@@ -119,7 +119,7 @@ def problem_of(records: Iterable[Record]) -> Problem:
     return evidence_of(campaign_of(records), damper_of((0.0,))).whole
 
 
-def diagnosed(records: Iterable[Record], jobs: int = 2, **config: object) -> Diagnosed:
+def diagnosed(records: Iterable[Record], jobs: int = 1, **config: object) -> Diagnosed:
     """The diagnosis of records of one setting; `config` is its block."""
     rig = Rig(tuple(records), ())
     settings = DiagnoseConfig.model_validate(config)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -104,15 +105,22 @@ def test_rivals_of_one_step_stay_rivals_when_another_effect_is_adopted_but_not_w
 SMALL = DiagnoseConfig(forbid=all_but("gas_spring", "orifice_quadratic", "stribeck_friction", "relief_valve"))
 
 
-def charged_orifice(rng: np.random.Generator) -> Problem:
+@pytest.fixture(scope="module")
+def problem(generator_for: Callable[[str], np.random.Generator]) -> Problem:
     """An orifice and the spring of a gas, at two frequencies and two amplitudes."""
     hidden = damper_of((0.0,), orifice_quadratic={"q": 3000.0}, gas_spring={"k_g": 3000.0})
-    return problem_of(sines(hidden, rng, voltages=(0.0,)))
+    return problem_of(sines(hidden, generator_for("charged orifice"), voltages=(0.0,), cycles=4))
 
 
-def with_effects(problem: Problem, *names: str) -> FitResult:
-    """The optimum with some effects, added one by one."""
-    found = fit(problem, (), problem.start())
+@pytest.fixture(scope="module")
+def without(problem: Problem) -> FitResult:
+    """The spring alone, beside which the other effects are tried."""
+    return with_effects(problem, "gas_spring")
+
+
+def with_effects(problem: Problem, *names: str, before: FitResult | None = None) -> FitResult:
+    """The optimum with some effects, added one by one to what was found before."""
+    found = before or fit(problem, (), problem.start())
     for name in names:
         found = converged(problem, found, fitted_beside(problem, found, library()[name])).fitted
     return found
@@ -123,28 +131,23 @@ def nothing_refused(_: Candidate) -> None:
 
 
 @pytest.mark.parametrize("first", ["stribeck_friction", "relief_valve"])
-def test_a_spurious_effect_gives_way_to_the_true_one(first: str, rng: np.random.Generator) -> None:
-    problem = charged_orifice(rng)
-    without, current = with_effects(problem, "gas_spring"), with_effects(problem, "gas_spring", first)
+def test_a_spurious_effect_gives_way_to_the_true_one(first: str, problem: Problem, without: FitResult) -> None:
+    current = with_effects(problem, first, before=without)
     step, kept = swap_step(problem, without, first, current, nothing_refused, SMALL, 1)
     assert kept.effect == step.chosen == "orifice_quadratic"
     assert kept.fitted.damper.effects["orifice_quadratic"]["q"] == pytest.approx(3000.0, rel=0.2)
     assert {*kept.fitted.effects} == {"gas_spring", "orifice_quadratic"}
 
 
-def test_the_best_effect_stays_in_the_swap_step(rng: np.random.Generator) -> None:
-    problem = charged_orifice(rng)
-    without = with_effects(problem, "gas_spring")
-    current = with_effects(problem, "gas_spring", "orifice_quadratic")
+def test_the_best_effect_stays_in_the_swap_step(problem: Problem, without: FitResult) -> None:
+    current = with_effects(problem, "orifice_quadratic", before=without)
     step, kept = swap_step(problem, without, "orifice_quadratic", current, nothing_refused, SMALL, 1)
     assert kept.fitted is current
     assert step.rivals == ()
 
 
-def test_an_unsupported_candidate_replaces_no_effect(rng: np.random.Generator) -> None:
-    problem = charged_orifice(rng)
-    without = with_effects(problem, "gas_spring")
-    current = with_effects(problem, "gas_spring", "stribeck_friction")
+def test_an_unsupported_candidate_replaces_no_effect(problem: Problem, without: FitResult) -> None:
+    current = with_effects(problem, "stribeck_friction", before=without)
 
     def refused(each: Candidate) -> str | None:
         return "a stand-in" if each.effect == "orifice_quadratic" else None
@@ -166,7 +169,7 @@ def told(other: float, rng: np.random.Generator) -> tuple[str, tuple[str, ...]]:
     """The verdict and its effects where every second test has another spring, so many times as stiff."""
     springs = (4000.0, other * 4000.0)
     records = tuple(
-        sine(damper_of((U,), gas_spring={"k_g": k}), U, f, x, rng, noise=0.003)
+        sine(damper_of((U,), gas_spring={"k_g": k}), U, f, x, rng, noise=0.003, cycles=4, rate=500.0)
         for U in (0.0, 150.0)
         for (f, x), k in zip(TESTS, 2 * springs, strict=True)
     )

@@ -74,30 +74,45 @@ def test_an_effect_file_of_ones_own_is_in_the_library(own: Pzd, tmp_path: Path) 
     assert "detent" not in own("effects", effects="").stdout
 
 
-@pytest.mark.parametrize(
-    ("file", "name", "ending", "said"),
-    [
-        ("gas_spring", "gas_spring", NEVER_NAMED, "the library has an effect of that name"),
-        ("detent", "other", NEVER_NAMED, "must be called other.py"),
-        ("detent", "detent", "", "nor why no verdict names it"),
-        ("detent", "detent", "broken=1,", "is no effect file: TypeError"),
-    ],
-)
-def test_a_file_that_cannot_be_taken_is_one_clear_error(
-    own: Pzd, tmp_path: Path, file: str, name: str, ending: str, said: str
-) -> None:
-    path = write(tmp_path / "mine", file, name, ending)
-    refused = own("effects")
-    assert refused.returncode == 2
-    assert refused.stderr.count("\n") == 1
-    assert str(path) in refused.stderr
-    assert said in refused.stderr
+IN_EACH = """
+import os, sys
+import numpy, pydantic, yaml  # what `pzd effects` loads whatever the folder, once for all
+from pzd.cli.app import status
+assert "pzd.damper.effects" not in sys.modules
+for folder in sys.argv[1:]:
+    print(f"in {folder}", file=sys.stderr, flush=True)
+    if not (child := os.fork()):
+        os.environ["PZD_EFFECTS"] = folder
+        code = status(["effects"])
+        sys.stderr.flush()
+        os._exit(code)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+"""`pzd effects` in each of some folders, forked from one process: a new one takes long to start."""
+REFUSED = [
+    ("gas_spring", "gas_spring", NEVER_NAMED, "the library has an effect of that name"),
+    ("detent", "other", NEVER_NAMED, "must be called other.py"),
+    ("detent", "detent", "", "nor why no verdict names it"),
+    ("detent", "detent", "broken=1,", "is no effect file: TypeError"),
+]
 
 
-def test_a_folder_that_is_not_there_is_told(own: Pzd) -> None:
-    refused = own("effects", effects="nowhere")
-    assert refused.returncode == 2
-    assert "PZD_EFFECTS: there is no folder of that name" in refused.stderr
+def test_a_folder_or_a_file_that_cannot_be_taken_is_one_clear_error(tmp_path: Path) -> None:
+    paths = [write(tmp_path / f"{i}", file, name, ending) for i, (file, name, ending, _) in enumerate(REFUSED)]
+    expected = [(str(path), said) for path, (*_, said) in zip(paths, REFUSED, strict=True)]
+    nowhere = tmp_path / "nowhere"
+    expected.append((str(nowhere), "PZD_EFFECTS: there is no folder of that name"))
+    folders = [*(str(path.parent) for path in paths), str(nowhere)]
+    command = [sys.executable, "-c", IN_EACH, *folders]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2"] * len(folders)
+    lines = done.stderr.splitlines()
+    assert lines[::2] == [f"in {folder}" for folder in folders]
+    assert len(lines) == 2 * len(folders)
+    for line, (place, said) in zip(lines[1::2], expected, strict=True):
+        assert place in line
+        assert said in line
 
 
 def test_kernels_and_stages_depend_on_the_files_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

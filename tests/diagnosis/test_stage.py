@@ -84,7 +84,7 @@ def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect(rng:
 def test_a_missing_effect_is_named_and_located(
     rng: np.random.Generator, effects: dict[str, dict[str, float]], place: str, forbid: tuple[str, ...]
 ) -> None:
-    found = diagnosed(sines(damper_of(TWO, **effects), rng, TWO), forbid=forbid)
+    found = diagnosed(sines(damper_of(TWO, **effects), rng, TWO, cycles=5), forbid=forbid)
     assert found.diagnosis.verdict == "named"
     assert found.diagnosis.effects == tuple(effects)
     assert any(place in region.region for region in found.diagnosis.where)

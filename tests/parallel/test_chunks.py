@@ -63,8 +63,11 @@ def worked(tmp_path: Path, *steps: object, jobs: int = 2) -> tuple[dict[int, int
     return found, lost
 
 
-def test_a_task_whose_process_is_killed_every_time_is_set_aside_and_all_others_are_done(tmp_path: Path) -> None:
-    found, lost = worked(tmp_path, killed_by_five)
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.ci)])
+def test_a_task_whose_process_is_killed_every_time_is_set_aside_and_all_others_are_done(
+    jobs: int, tmp_path: Path
+) -> None:
+    found, lost = worked(tmp_path, killed_by_five, jobs=jobs)
     assert found == {task: None if task == 5 else 2 * task for task in range(12)}
     assert lost == [(0, "5: the process that did it was lost 3 times: it was killed")]
 

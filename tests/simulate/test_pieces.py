@@ -29,11 +29,11 @@ def ridden(damper: Damper, **given: object) -> Rides:
 
 
 def test_the_numbers_of_a_ride_in_pieces_are_those_of_the_whole(damper, monkeypatch) -> None:
-    """Pieces of 3 s, the settling time in the second one; two voltages of the search must be told apart alike."""
-    given = {"duration_s": 9.0, "settle_s": 4.0, "output_rate_Hz": 100.0}
+    """Pieces of 2 s, the settling time in the second one; two voltages of the search must be told apart alike."""
+    given = {"duration_s": 6.0, "settle_s": 3.0, "output_rate_Hz": 100.0}
     whole = ridden(damper, **given)
-    monkeypatch.setattr(outcome, "PIECE_S", 3.0)
-    monkeypatch.setattr("pzd.simulate.study.tuning.PIECE_S", 3.0)
+    monkeypatch.setattr(outcome, "PIECE_S", 2.0)
+    monkeypatch.setattr("pzd.simulate.study.tuning.PIECE_S", 2.0)
     parts = ridden(damper, **given)
     for table in ("summary", "wheels", "weighted", "ridden"):
         for one, other in zip(getattr(whole, table), getattr(parts, table), strict=True):
