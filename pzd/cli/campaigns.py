@@ -102,6 +102,7 @@ def blind(
     from pzd.blind.summary import write
     from pzd.parallel.engines import Where
     from pzd.pipeline.command import opened
+    from pzd.runs.disk import refuse_links_below
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
@@ -109,6 +110,7 @@ def blind(
     places = folder_of(given.run.folder / FOLDER, setup.blind)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
+        refuse_links_below(places.folder)
         made_from = _made_from(whole)
         with given.placed():
             _entered(setup.blind, made_from, config.parent)
