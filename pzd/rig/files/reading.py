@@ -19,6 +19,7 @@ from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERAT
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Fixture, Limits
 from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
+from pzd.rig.files.child import end_child
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
@@ -276,6 +277,7 @@ def read(
             config_faults += error.messages
         except DataError as error:
             data_faults += error.messages
+    end_child()
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
     right = [both for both in tests if not works_on_the_rig(both[1])]
