@@ -301,7 +301,8 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
     found = []
-    for test in map(on_regular_clock, tests):
+    bare = replace(sheet, numbers={}, texts={})  # the channels are made of them
+    for test in (on_regular_clock(replace(test, sheet=bare)) for test in tests):
         time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
         alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
         found.append((test, alone))
