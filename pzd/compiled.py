@@ -3,30 +3,42 @@
 Numba keys a cached kernel by the file of the outermost function alone, so an edited law would
 leave a stale kernel behind. The cache folder therefore carries a hash of every source of the
 damper, of the laws of the blind benchmark, of every module that compiles, and of the versions:
-edit a law, and the kernels are new.
+edit a law, and the kernels are new. What stands in the cache is executed, so a folder counts only where no other user
+can have written to it, and what is damaged there is compiled anew.
 """
 
 from __future__ import annotations
 
+import atexit
 import gc
 import hashlib
+import logging
 import os
 import platform
+import shutil
+import stat
 import sys
 import tempfile
+import zlib
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from pickle import loads
 from types import FunctionType
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, NoReturn, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
 from numba import types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.serialize import dumps
 from numba.extending import typeof_impl
 
 from pzd.own_effects import own_files
+from pzd.schema.errors import FilesError
+
+log = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -40,32 +52,168 @@ def sources() -> list[Path]:
     return sorted({Path(__file__), *laws, *own_files(), *others})
 
 
+PLACE = "PZD_CACHE"
+"""Environment variable that names another folder for the compiled kernels."""
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels: in the user's cache, or a temporary one where that is not writable."""
+    """Return the folder of compiled kernels, which belongs to this user and which no other can write to.
+
+    It stands in the folder that `PZD_CACHE` names, else in the user's cache, else in the temporary folder. Where none
+    of these will do, it is a fresh one that ends with the process; those that the process starts find it too.
+
+    Raises
+    ------
+    FilesError : when no folder can be made
+    """
     digest = hashlib.sha256()
     for part in (sys.version, platform.machine(), numba.__version__, np.__version__):
         digest.update(part.encode())
     for source in sources():
         digest.update(source.read_bytes())
+    name = digest.hexdigest()[:16]
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111  # Path's may raise
-    for root in (Path(home), Path(tempfile.gettempdir())):
-        folder = root / "pzd" / digest.hexdigest()[:16]
-        if not root.is_absolute():
-            continue  # nobody's home is known
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    return Path(tempfile.mkdtemp(prefix="pzd-"))
+    user = f"-{os.geteuid()}" if hasattr(os, "geteuid") else ""
+    places = [Path(home) / "pzd", Path(tempfile.gettempdir()) / f"pzd{user}"]
+    if os.environ.get(PLACE):
+        places.insert(0, Path(os.environ[PLACE]))
+    found = (_kept(place, name) for place in places if place.is_absolute())  # it is not where nobody's home is known
+    return next((folder for folder in found if folder is not None), None) or _passing(name)
+
+
+def _kept(place: Path, name: str) -> Path | None:
+    """Return a folder of this user in another one of theirs, both made where absent; None where that cannot be."""
+    folder = place / name
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        above = place.parent.stat().st_mode
+        if hasattr(os, "geteuid") and above & stat.S_IWOTH and not above & stat.S_ISVTX:
+            return None  # anybody could put another folder in the place of ours
+        for one in (place, folder):
+            with suppress(FileExistsError):
+                one.mkdir(mode=0o700)
+            if not _is_mine(one):
+                return None
+            if one is place and one.stat().st_mode & _OTHERS_WRITE:
+                one.chmod(0o700)  # a umask of 002 made it so; what stands in it is looked at by itself
+        return folder if os.access(folder, os.W_OK) and not _writable_by_others(folder) else None
+    except OSError:
+        return None
+
+
+def _is_mine(folder: Path) -> bool:
+    """Whether a path, and the folder that it leads to, belong to this user."""
+    if not hasattr(os, "geteuid"):  # without owners
+        return folder.is_dir()
+    owners = {folder.lstat().st_uid, folder.stat().st_uid}
+    return folder.is_dir() and owners == {os.geteuid()}
+
+
+def _writable_by_others(folder: Path) -> bool:
+    return hasattr(os, "geteuid") and bool(folder.stat().st_mode & _OTHERS_WRITE)
+
+
+@cache
+def _passing(name: str) -> Path:
+    """Return a folder of this process and of those that it starts."""
+    try:
+        place = Path(tempfile.mkdtemp(prefix="pzd-"))  # of this user alone, by Python's promise
+        (place / name).mkdir(mode=0o700)
+    except OSError as error:
+        refuse_cache(Path(tempfile.gettempdir()), error)
+    log.warning(
+        "compiled kernels are not kept for the next command: no folder for them belongs to you alone; set %s to one",
+        PLACE,
+    )
+    os.environ[PLACE] = str(place)
+    maker = os.getpid()
+    atexit.register(lambda: shutil.rmtree(place, ignore_errors=True) if os.getpid() == maker else None)
+    return place / name
+
+
+def refuse_cache(place: Path, error: OSError) -> NoReturn:
+    """Say that the cache cannot be written.
+
+    Raises
+    ------
+    FilesError : naming it
+    """
+    raise FilesError(
+        f"{place}: the cache of compiled kernels cannot be written ({error.strerror or error}); "
+        f"make room there, or set {PLACE} to another folder"
+    ) from error
 
 
 numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]  # numba sets its options up at run time
 
 
+class _Checked(IndexDataCacheFile):
+    """Entries of numba's cache, each with a checksum: a damaged one may read well and run wild."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save an entry with its key and checksum."""
+        sealed = dumps((key, data))
+        super().save(key, (zlib.crc32(sealed), sealed))
+
+    def load(self, key: Any) -> Any:
+        """Load an entry, None where there is none.
+
+        Raises
+        ------
+        ValueError : when it is not what was saved
+        """
+        found = super().load(key)
+        if found is None:
+            return None
+        checksum, sealed = found
+        if zlib.crc32(sealed) != checksum:
+            raise ValueError("the entry is damaged")
+        saved_as, data = loads(sealed)  # noqa: S301  # from a folder of this user
+        if saved_as != key:
+            raise ValueError("the entry is another one's")
+        return data
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of a function, without which everything is computed all the same."""
+
+    def __init__(self, function: FunctionType) -> None:
+        super().__init__(function)
+        locator = self._impl.locator
+        self._cache_file = _Checked(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load a kernel; None where there is none, or one that is damaged, which is then compiled anew."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # noqa: BLE001  # damaged pickles raise anything
+            log.debug("%s: compiled anew (%s)", self._cache_file._index_path, error)  # noqa: SLF001  # numba's name
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save a kernel, unless the disk refuses."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_of_cache(error.strerror or str(error))
+
+
+@cache
+def _warn_of_cache(why: str) -> None:
+    """Say once that kernels cannot be kept."""
+    log.warning(
+        "%s: the cache of compiled kernels cannot be written (%s), so each command compiles anew; make room there, "
+        "or set %s to another folder",
+        numba.config.CACHE_DIR,  # type: ignore[attr-defined]  # numba sets its options up at run time
+        why,
+        PLACE,
+    )
+
+
 _OPTIONS: dict[str, Any] = {
-    "cache": True,
     "error_model": "numpy",
     "nogil": True,
     "no_cfunc_wrapper": True,  # nothing here is called from C, and the wrapper costs a tenth of the compiling
@@ -121,6 +269,10 @@ def _dispatcher(function: FunctionType, **options: Any) -> Any:
     dispatcher = numba.njit(function, **_OPTIONS, **options)
     if dispatcher is function:  # under NUMBA_DISABLE_JIT, for a debugger
         return function
+    try:
+        dispatcher._cache = _Cache(function)  # noqa: SLF001  # numba documents no way to give it another
+    except (OSError, RuntimeError):  # numba's word for a folder that it cannot write to
+        _warn_of_cache("numba cannot write there")
     compile_now = dispatcher.compile
     file_lock = Path(numba.config.CACHE_DIR) / f"{function.__module__}.{function.__qualname__}.lock"  # type: ignore[attr-defined]  # numba sets its options up at run time
 

@@ -101,6 +101,10 @@ class Condition:
         return self.setting, self.voltage, self.temperature
 
 
+_AT_A_TIME = 65536
+"""Samples of which the running median is taken at a time."""
+
+
 def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]:
     """Find the glitches of a channel: up to three samples that jump away from their neighbours and back.
 
@@ -131,8 +135,11 @@ def deviation_from_median(values: Array) -> Array:
     if values.size <= 2 * half:
         return np.zeros_like(values)
     padded = np.pad(values, half, mode="reflect")
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
-    deviation: Array = values - middle
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    deviation = np.empty_like(values)
+    for first in range(0, values.size, _AT_A_TIME):  # the windows of all samples are copied, seven times the record
+        rows = slice(first, first + _AT_A_TIME)
+        deviation[rows] = values[rows] - np.median(windows[rows], axis=1)
     return deviation
 
 

@@ -22,7 +22,7 @@ from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 from pzd.artefacts import Diagnosis, Gap, HeldOutTest, HeldOutVoltage, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
 from pzd.cli.look import diagnosis_lines
-from pzd.cli.output import Output
+from pzd.cli.output import Output, complain
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.parallel.processes import Progress
@@ -273,6 +273,32 @@ def test_wrong_data_are_code_3_and_every_file_is_listed(typed: Terminal) -> None
         assert typed(command, "first.yaml") == 3
         assert typed.err == [f"data/{name}.csv:1: a number is needed (got nonsense)" for name in ("a", "b")]
         assert not Path("runs").exists()
+
+
+def test_control_characters_in_the_header_of_a_rig_file_are_written_out(typed: Terminal) -> None:
+    rows = "".join(f"{i / 100},{i % 7}\n" for i in range(50))
+    Path("data/a.csv").write_text(
+        f"Time [s],Fo\x1b]0;owned\x07\x1b[2J\x9b31m\u202esnoitcurtsni\n{rows}", encoding="utf-8"
+    )
+    assert typed("init", "data/a.csv") == 0
+    printed = "\n".join(typed.out)
+    assert r"Fo\x1b]0;owned\x07\x1b[2J\x9b31m\u202esnoitcurtsni" in printed
+    assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", printed)
+
+
+def test_complaints_hold_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+    complain(["a.csv:1: missing column (got \x1b]0;owned\x07)"])
+    assert capsys.readouterr().err == "a.csv:1: missing column (got \\x1b]0;owned\\x07)\n"
+
+
+def test_lines_and_json_for_the_terminal_hold_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+    output = Output(quiet=False, verbose=False)
+    output.say("a\tb \x1b[31m\rred\x7f")
+    output.say_json({"name": "\x1b[31m\x9b\x7f"})
+    line, *data = capsys.readouterr().out.split("\n")
+    assert line == r"a	b \x1b[31m\x0dred\x7f".replace(r"\t", "\t")
+    assert json.loads("\n".join(data)) == {"name": "\x1b[31m\x9b\x7f"}
+    assert "\x9b" not in "".join(data)
 
 
 def test_an_artefact_edited_wrongly_is_code_3_with_file_and_line(typed: Terminal) -> None:

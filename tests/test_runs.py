@@ -21,6 +21,7 @@ from filelock import FileLock, Timeout
 from pzd.artefacts import Identified, ParameterRow
 from pzd.quantities import Control
 from pzd.runs import Run, file_hash
+from pzd.runs.disk import refuse_links_below
 from pzd.runs.folder import MANIFEST
 from pzd.schema.errors import ConfigError, FilesError
 
@@ -415,6 +416,77 @@ def test_what_stands_where_we_write_is_named_and_left(run: Run, name: str) -> No
     assert caught.value.messages[0].startswith(f"{run.folder / name}: this stands where ")
     assert (run.folder / name).read_text() == "mine"
     assert level(run) == 3.0
+
+
+# ---------------------------------------------------------------- links that somebody planted
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    """A folder outside of the run, with a file that nobody may touch."""
+    folder = tmp_path / "outside"
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
+    return folder
+
+
+def test_a_stage_folder_that_is_a_link_is_told_in_one_line_and_left(run: Run, outside: Path) -> None:
+    run.folder.mkdir(parents=True)
+    (run.folder / "2-identify").symlink_to(outside)
+    with pytest.raises(FilesError) as caught:
+        write(run, identified(3.0))
+    [message] = caught.value.messages
+    assert message.startswith(f"{run.folder / '2-identify'}: this is a link (to {outside})")
+    assert contents(outside) == {"mine.txt": "mine"}
+    assert (run.folder / "2-identify").is_symlink()
+
+
+@pytest.mark.parametrize("name", ["1-rig", "export", "sweep", "blind", "figures", ".lock"])
+def test_no_command_writes_beside_or_through_a_link(run: Run, outside: Path, name: str) -> None:
+    run.folder.mkdir(parents=True)
+    (run.folder / name).symlink_to(outside / "mine.txt" if name == ".lock" else outside)
+    with pytest.raises(FilesError, match="this is a link"):
+        write(run, identified(3.0))
+    assert contents(outside) == {"mine.txt": "mine"}
+
+
+def test_a_run_folder_that_is_a_link_is_refused(run: Run, outside: Path) -> None:
+    run.folder.parent.mkdir()
+    run.folder.symlink_to(outside)
+    with pytest.raises(FilesError, match="this is a link"):
+        write(run, identified(3.0))
+    assert contents(outside) == {"mine.txt": "mine"}
+
+
+@pytest.mark.parametrize("name", [".holder", ".config.yaml.new", "config.yaml"])
+def test_a_link_in_the_place_of_a_file_is_replaced_and_not_followed(run: Run, outside: Path, name: str) -> None:
+    run.folder.mkdir(parents=True)
+    (run.folder / name).symlink_to(outside / "mine.txt")
+    with run.locked("pzd run"):
+        run.write_config("seed: 1\n")
+    assert contents(outside) == {"mine.txt": "mine"}
+    assert not (run.folder / "config.yaml").is_symlink()
+    assert (run.folder / "config.yaml").read_text().endswith("\nseed: 1\n")
+
+
+def test_an_edited_result_is_not_copied_through_a_link_to_nowhere(run: Run, outside: Path) -> None:
+    with run.locked("pzd run"):
+        run.write_config("seed: 1\n")
+        (run.folder / "config.yaml").write_text("edit")
+        name = f"config.yaml.edited-{file_hash(run.folder / 'config.yaml')[:8]}"
+        (run.folder / name).symlink_to(outside / "planted")
+        run.write_config("seed: 1\n")
+    assert contents(outside) == {"mine.txt": "mine"}
+    assert [path.read_text() for path in run.folder.glob("config.yaml.edited-*") if not path.is_symlink()] == ["edit"]
+
+
+def test_a_link_deep_in_a_folder_that_is_written_file_by_file_is_found(tmp_path: Path, outside: Path) -> None:
+    chunks = tmp_path / "sweep" / "chunks"
+    chunks.mkdir(parents=True)
+    refuse_links_below(tmp_path / "sweep")
+    (chunks / "000000-000003.new").symlink_to(outside / "mine.txt")
+    with pytest.raises(FilesError, match="this is a link"):
+        refuse_links_below(tmp_path / "sweep")
 
 
 # ---------------------------------------------------------------- who waits

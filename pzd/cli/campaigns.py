@@ -72,12 +72,14 @@ def blind(call: Call) -> int:
     from pzd.blind.benchmark import Benchmark, Methods, folder_of
     from pzd.blind.summary import write
     from pzd.parallel.engines import Where
+    from pzd.runs.disk import refuse_links_below
 
     given, base = call.opened, call.config.parent
     setup, whole = _setup(given.config), given.config
     places = folder_of(given.run.folder / FOLDER, setup.blind)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
+        refuse_links_below(places.folder)
         made_from = _made_from(whole)
         with given.placed():
             _entered(setup.blind, made_from, base)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -22,6 +23,8 @@ UNTRUSTED = 4
 if TYPE_CHECKING:
     from pzd.parallel.processes import Progress
 
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""Characters that a terminal obeys instead of showing them, and those that turn the direction of the text behind."""
 _BAR = 24
 """Width of the progress bar in characters."""
 
@@ -51,7 +54,7 @@ class Output:
         from pzd.schema.validate import json_text
 
         if not self.silent:
-            _print(json_text(data), sys.stdout)
+            _print(harmless(json_text(data), json=True), sys.stdout)
 
     def progress(self, event: Progress) -> None:
         """Show how far a stage has come: a line each where the user wants to see all, else a bar on a terminal."""
@@ -78,7 +81,7 @@ class _Handler(logging.Handler):
 
 def _draw(event: Progress) -> None:
     filled = _BAR * event.done // max(event.whole, 1)
-    line = f"[{'#' * filled}{'.' * (_BAR - filled)}] {event}"
+    line = harmless(f"[{'#' * filled}{'.' * (_BAR - filled)}] {event}")
     sys.stderr.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
     sys.stderr.flush()
 
@@ -104,9 +107,25 @@ def exit_code(marks: Iterable[str]) -> int:
     return UNTRUSTED if lines else DONE
 
 
+def harmless(text: str, *, json: bool = False) -> str:
+    """Return text with its control characters written out: a header of a rig file may hold those of a terminal.
+
+    Parameters
+    ----------
+    text : what is to be printed; line ends and tabs stay
+    json : whether they are written as JSON does
+    """
+
+    def written(found: re.Match[str]) -> str:
+        code = ord(found[0])
+        return f"\\u{code:04x}" if json or code > 0xFF else f"\\x{code:02x}"
+
+    return _CONTROL.sub(written, text)
+
+
 def _print(line: str, stream: TextIO) -> None:
     try:
-        stream.write(f"{line}\n")
+        stream.write(f"{harmless(line)}\n")
         stream.flush()
     except BrokenPipeError:
         silence(stream)

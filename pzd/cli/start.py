@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -102,7 +103,7 @@ def _propose(run: Path, out: Path | None, output: Output) -> int:
     proposal = proposal_of(found.hypotheses.alone, run.as_posix(), largest)
     folder = out or own_folder() or Path("effects")
     file = folder / f"{proposal.name}.py"
-    if file.exists():
+    if os.path.lexists(file):  # a link to nowhere would be written through
         raise ConfigError(f"{file}: there is a file of that name, which is not written over; move it, or give --out")
     folder.mkdir(parents=True, exist_ok=True)
     file.write_text(proposal.text, encoding="utf-8", newline="\n")

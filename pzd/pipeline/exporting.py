@@ -12,7 +12,7 @@ from pzd.artefacts import Diagnosed, Identified, Table
 from pzd.export.content import WRITTEN_BY_PZD, Content
 from pzd.export.formats import Format, format_of
 from pzd.pipeline.command import Opened, stale_stages
-from pzd.runs.disk import as_files_error, versions
+from pzd.runs.disk import as_files_error, refuse_links, versions, write_afresh
 from pzd.schema.errors import ConfigError, FilesError
 
 log = logging.getLogger(__name__)
@@ -63,12 +63,14 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
         files = wanted.files(content)
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
-        if out is not None:  # that of the run is pzd's own
+        if out is None:
+            refuse_links((given.run.folder, folder))
+        else:  # that of the run is pzd's own
             _check_own(folder / name for name in files)
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             fresh = folder / f".{name}.new"
-            fresh.write_bytes(data)
+            write_afresh(fresh, data)
             fresh.replace(folder / name)
         for path in _outdated(folder, wanted, content, files):
             path.unlink()

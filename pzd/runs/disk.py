@@ -6,7 +6,7 @@ import hashlib
 import os
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from functools import cache
@@ -61,6 +61,40 @@ def as_files_error(place: Path) -> Iterator[None]:
         raise FilesError(f"{error.filename or place}: {error.strerror or error}") from error
 
 
+def refuse_links(paths: Iterable[Path]) -> None:
+    """Refuse to write where a link stands: it may lead anywhere, as in a run folder that somebody sent.
+
+    Raises
+    ------
+    FilesError : naming every link
+    """
+    links = [path for path in paths if path.is_symlink()]
+    if links:
+        raise FilesError(
+            f"{path}: this is a link (to {path.readlink()}), and results are not written through one; remove it"
+            for path in links
+        )
+
+
+def refuse_links_below(folder: Path) -> None:
+    """Refuse to write into a folder that is a link or holds one, at any depth.
+
+    Raises
+    ------
+    FilesError : naming every link
+    """
+    refuse_links([folder])
+    below = (Path(place) / name for place, folders, files in os.walk(folder) for name in (*folders, *files))
+    refuse_links(below)
+
+
+def write_afresh(path: Path, data: bytes) -> None:
+    """Write a new file in place of what has the name, a link included, which is not followed."""
+    path.unlink(missing_ok=True)
+    with path.open("xb") as file:
+        file.write(data)
+
+
 def sync_folder(folder: Path) -> None:
     """Have the disk hold a folder and everything in it."""
     for path in folder.rglob("*"):
@@ -104,13 +138,14 @@ def locked(folder: Path, command: str) -> Iterator[None]:
 
     Raises
     ------
-    FilesError : when another command holds it, or the folder cannot be written
+    FilesError : when another command holds it, or the folder cannot be written or is a link
     """
+    refuse_links((folder, folder / _LOCK))
     with as_files_error(folder):
         lock = _acquired(folder)
     try:
         with as_files_error(folder):
-            (folder / _HOLDER).write_text(_holder(command), encoding="utf-8")
+            write_afresh(folder / _HOLDER, _holder(command).encode())
         yield
     finally:
         with suppress(OSError):  # somebody may have removed the folder meanwhile

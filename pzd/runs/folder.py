@@ -21,7 +21,16 @@ from typing import TypeVar
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
 from pzd.quantities import Control
-from pzd.runs.disk import as_files_error, file_hash, locked, sync, sync_folder, versions
+from pzd.runs.disk import (
+    as_files_error,
+    file_hash,
+    locked,
+    refuse_links,
+    sync,
+    sync_folder,
+    versions,
+    write_afresh,
+)
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.validate import read_json, write_json
 
@@ -37,6 +46,8 @@ _WRITTEN = ".written.json"
 """Hashes of what was written into a folder that is no stage and has no manifest."""
 _FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures", "peers")
 """What a run's folder may hold."""
+_WRITTEN_IN_PLACE = ("export", "sweep", "blind")
+"""What it may hold beside them, where files are replaced one by one."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""
 NEW = ".new"
@@ -147,9 +158,10 @@ class Run:
 
         Raises
         ------
-        FilesError : when another command holds it, or the folder cannot be written
+        FilesError : when another command holds it, or the folder cannot be written, or a link stands in it
         """
         with locked(self.folder, command):
+            refuse_links(self.folder / name for name in (*_FOLDERS, *_WRITTEN_IN_PLACE))
             with as_files_error(self.folder):
                 clean_up(self.folder)
             yield
@@ -161,9 +173,12 @@ class Run:
             whole = _CONFIG_HEAD.format(digest=_digest(text)) + text
             if path.exists() and path.read_bytes() == whole.encode():
                 return
-            fresh.write_text(whole, encoding="utf-8", newline="\n")
+            write_afresh(fresh, whole.encode())
             sync(fresh)
-            if path.exists() and not _as_written(path.read_text(encoding="utf-8", errors="replace")):
+            before = (
+                "" if path.is_symlink() or not path.exists() else path.read_text(encoding="utf-8", errors="replace")
+            )
+            if before and not _as_written(before):
                 _keep_edited(path, self.folder)
             fresh.replace(path)
 
@@ -298,9 +313,14 @@ def _keep_edited(path: Path, folder: Path) -> None:
     """Copy an edited result into a folder, under a name that its content gives: another edit never takes its place."""
     digest = file_hash(path)
     names = (f"{path.name}.edited-{digest[:length]}" for length in range(8, len(digest) + 1))
-    free = next(copy for name in names if not (copy := folder / name).exists() or file_hash(copy) == digest)
+    free = next(folder / name for name in names if _is_free(folder / name, digest))
     free.parent.mkdir(parents=True, exist_ok=True)
     shutil.copy2(path, free)
+
+
+def _is_free(copy: Path, digest: str) -> bool:
+    """Whether a copy can be written: nothing stands there, not even a link to nowhere, or the same content."""
+    return not os.path.lexists(copy) or (not copy.is_symlink() and file_hash(copy) == digest)
 
 
 # --- What a killed command left half done: finished, undone, or removed

@@ -9,11 +9,12 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypeVar, get_args
+from typing import Any, TextIO, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,18 +79,57 @@ Columns = dict[str, NDArray[np.float64]]
 
 _WRITTEN = 10_000
 """Rows that are turned into text at a time, so that memory does not grow with the file."""
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n].", re.DOTALL)
+"""Text that a spreadsheet computes, or would without the apostrophes; one character alone, as the unit -, is none."""
 _MOST_FAULTS = 20
 """Faults of one file that a message lists before it only counts them."""
 
 
 def write_rows(path: Path, model: type[Row], rows: Iterable[Row], control: Control) -> None:
-    """Write one line for each row under the model's field names; None is an empty cell."""
+    """Write one line for each row under the model's field names; None is an empty cell, text is disarmed."""
     names = tuple(model.model_fields)
+    texts = [name for name, field in model.model_fields.items() if _takes_text(field.annotation)]
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
+        writer = csv.writer(_Lines(file), lineterminator="\r\n")
         writer.writerow([control.renamed(name) for name in names])
         # The writer leaves None empty and writes a float as `repr` has it, which reads back exactly.
-        writer.writerows([getattr(row, name) for name in names] for row in rows)
+        writer.writerows(
+            [disarmed(getattr(row, name)) if name in texts else getattr(row, name) for name in names] for row in rows
+        )
+
+
+class _Lines:
+    """A file of lines that end in a line feed, for a writer that quotes a carriage return only if lines end in one."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, line: str) -> int:
+        """Write a line."""
+        return self._file.write(line.removesuffix("\r\n") + "\n")
+
+
+def disarmed(cell: Any) -> Any:
+    """Return a cell that no spreadsheet takes for a formula: text that begins like one, behind an apostrophe.
+
+    Numbers stay as they are, those in text too.
+
+    Examples
+    --------
+    >>> disarmed("=HYPERLINK(1)"), disarmed("-1.5"), disarmed("'=1")
+    ("'=HYPERLINK(1)", '-1.5', "''=1")
+    """
+    armed = isinstance(cell, str) and _FORMULA.match(cell) is not None and not _is_number(cell)
+    return f"'{cell}" if armed else cell
+
+
+def _restored(cell: str) -> str:
+    """Return the text that `disarmed` made a cell of."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
+
+def _takes_text(annotation: Any) -> bool:
+    return not {annotation, *get_args(annotation)}.isdisjoint({str})
 
 
 def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]:
@@ -329,6 +369,8 @@ def _typed(cell: str, annotation: Any) -> str | float | None:
     kinds = {annotation, *get_args(annotation)}
     if not cell:
         return None if NoneType in kinds else cell
+    if str in kinds:
+        cell = _restored(cell)
     takes_numbers = not kinds.isdisjoint({int, float}) or any(isinstance(kind, int) for kind in kinds)
     if not takes_numbers or not _is_number(cell):
         return cell

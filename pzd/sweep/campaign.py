@@ -20,6 +20,7 @@ from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.pipeline.dependencies import code_hash
 from pzd.quantities import Control
 from pzd.runs import file_hash
+from pzd.runs.disk import refuse_links_below
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.validate import read_json_list, write_json
 from pzd.sweep.gather import Results, decisive, page, write
@@ -192,6 +193,7 @@ class SweepRuns:
 
     def _prepare(self, *, afresh: bool) -> None:
         """Remove what was made from another config, from other records or by other code."""
+        refuse_links_below(self.folder)
         if afresh or not self._is_of_this_config():
             shutil.rmtree(self._chunks_folder, ignore_errors=True)
         self._chunks_folder.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,7 @@ from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section
 from pzd.report.columns import Column, Table
 from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, shortened, styled
 from pzd.report.page import render
-from pzd.schema.csvfile import write_rows
+from pzd.schema.csvfile import disarmed, write_rows
 from pzd.schema.errors import counted
 from pzd.schema.model import Frozen
 from pzd.schema.yamltree import Scalar
@@ -245,7 +245,7 @@ def _write_table(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str,
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([control.renamed(name) for name in columns])
-        writer.writerows([row.get(name) for name in columns] for row in rows)
+        writer.writerows([disarmed(row.get(name)) for name in columns] for row in rows)
 
 
 def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Scalar]], control: Control) -> None:

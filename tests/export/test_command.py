@@ -189,6 +189,23 @@ def test_curves_of_an_earlier_export_go_and_nothing_else_does(
     assert {path: path.read_text() for path in foreign} == foreign
 
 
+def test_an_export_follows_no_link_that_stands_in_the_run(typed, tmp_path: Path) -> None:
+    typed("table", "first.yaml")
+    mine, folder = tmp_path / "mine.txt", Path("runs/first/export")
+    mine.write_text("mine")
+    folder.mkdir()
+    for name in ("first-force.csv", ".first-force.csv.new"):
+        (folder / name).symlink_to(mine)
+    assert typed("export", "first.yaml", "--to", "csv")[0] == 0
+    assert mine.read_text() == "mine"
+    assert not (folder / "first-force.csv").is_symlink()
+    folder.rename("elsewhere")
+    folder.symlink_to(tmp_path / "elsewhere")
+    code, _, err = typed("export", "first.yaml", "--to", "csv")
+    assert (code, len(err)) == (5, 1)
+    assert "this is a link" in err[0]
+
+
 def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:
     typed("table", "first.yaml")
     Path("taken").write_text("mine")

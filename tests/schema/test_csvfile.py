@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Literal
 
@@ -54,6 +55,28 @@ def test_rows_read_back_with_every_bit(tmp_path: Path, control: Control) -> None
     found = read_rows(path, Row, control)
     assert found == rows
     assert np.signbit(found[0].force_N)
+
+
+@pytest.mark.parametrize(
+    "text", ["=HYPERLINK(1)", "+A1", "-A1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "'=1", "''=1", "=1,2", "-1.5 mm"]
+)
+def test_text_that_a_spreadsheet_would_compute_is_disarmed_and_reads_back(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    rows = (Row(name=text, voltage_V=-1.5, force_N=-2.0, published=text),)
+    write_rows(path, Row, rows, VOLTAGE)
+    with path.open(newline="", encoding="utf-8") as file:
+        _, cells = csv.reader(file)
+    assert cells == [f"'{text}", "-1.5", "-2.0", "1", f"'{text}"]
+    assert read_rows(path, Row, VOLTAGE) == rows
+
+
+@pytest.mark.parametrize("text", ["-", "-1.5", "+3e4", "a=b", "'tis", "'", "gap 0.25 mm", ""])
+def test_numbers_and_other_text_stay_as_they_are(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    rows = (Row(name=text, voltage_V=None, force_N=1.0),)
+    write_rows(path, Row, rows, VOLTAGE)
+    assert path.read_text(encoding="utf-8").splitlines()[1] == f"{text},,1.0,1,"
+    assert read_rows(path, Row, VOLTAGE) == rows
 
 
 def test_no_rows_are_a_header_alone(tmp_path: Path) -> None:

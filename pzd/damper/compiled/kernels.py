@@ -17,7 +17,7 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.compiled import cache_folder
+from pzd.compiled import cache_folder, refuse_cache
 from pzd.damper.compiled.columns import DRIVE, PARALLEL, STROKE_AND_FLOW, Column, acting
 from pzd.damper.confounders import module_of
 from pzd.damper.effect import ELEMENT, Effect, arguments, functions
@@ -244,13 +244,16 @@ FLOW = len(ELEMENT) + sum(len(effect.parameters) for effect in acting("stroke"))
 
 
 def _load() -> ModuleType:
-    """Import the generated module, written by the first process that needs it."""
-    path = cache_folder() / "damper_kernels.py"
-    if not path.exists():
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(source())
-        Path(temporary).replace(path)
+    """Import the generated module, written by the first process that needs it, and anew where it was damaged."""
+    path, text = cache_folder() / "damper_kernels.py", source().encode()
+    if not path.is_file() or path.read_bytes() != text:
+        try:
+            handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+            with os.fdopen(handle, "wb") as file:
+                file.write(text)
+            Path(temporary).replace(path)
+        except OSError as error:
+            refuse_cache(path.parent, error)
     spec = importlib.util.spec_from_file_location("pzd_damper_kernels", path)
     if spec is None or spec.loader is None:
         raise ImportError(f"cannot load {path}")

@@ -20,6 +20,7 @@ def csv_files(content: Content) -> Files:
     import io
 
     from pzd.export.content import comment, tables
+    from pzd.schema.csvfile import disarmed
 
     found = {}
     for name, table in tables(content).items():
@@ -28,7 +29,7 @@ def csv_files(content: Content) -> Files:
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(table.cells)
         writer.writerows(
-            ["" if cell is None else cell for cell in row] for row in zip(*table.cells.values(), strict=True)
+            ["" if cell is None else disarmed(cell) for cell in row] for row in zip(*table.cells.values(), strict=True)
         )
         found[f"{content.name}-{name}.csv"] = text.getvalue().encode()
     return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -359,9 +360,11 @@ def _starts(sheet: Sheet, split: FileSplit | None, time: Array, place: str) -> l
         header = split.column or split.event or ""
         if sheet.header.count(header) != 1:
             raise DataError(f"{sheet.top}: {place}.split: no single column {header!r}")
-        cells = np.array(sheet.texts[sheet.header.index(header)])
-        by_event = np.char.find(cells[1:], split.begins or "") >= 0
-        begins[1:] = cells[1:] != cells[:-1] if split.column is not None else by_event
+        cells = sheet.texts[sheet.header.index(header)]  # as an array, each would take as much as the longest
+        if split.column is not None:
+            begins[1:] = [after != before for before, after in pairwise(cells)]
+        else:
+            begins[1:] = [(split.begins or "") in cell for cell in cells[1:]]
     begins[list(sheet.starts)] = True
     return [int(row) for row in np.flatnonzero(begins)]
 

@@ -19,6 +19,7 @@ from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERAT
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Fixture, Limits
 from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
+from pzd.rig.files.child import end_child
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
@@ -276,6 +277,7 @@ def read(
             config_faults += error.messages
         except DataError as error:
             data_faults += error.messages
+    end_child()
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
     right = [both for both in tests if not works_on_the_rig(both[1])]
@@ -299,7 +301,8 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
     found = []
-    for test in map(on_regular_clock, tests):
+    bare = replace(sheet, numbers={}, texts={})  # the channels are made of them
+    for test in (on_regular_clock(replace(test, sheet=bare)) for test in tests):
         time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
         alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
         found.append((test, alone))

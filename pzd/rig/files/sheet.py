@@ -100,10 +100,17 @@ def table_place(path: Path, table: str) -> str:
     return f"{path}:{table}" if table else at(path)
 
 
-def listed_faults(path: Path, header: str, bad: Sequence[tuple[str, str]]) -> list[str]:
-    """List bad cells of one column by their places and what is wrong; the first few, and how many more."""
+def listed_faults(path: Path, header: str, bad: Sequence[tuple[str, str]], count: int | None = None) -> list[str]:
+    """List bad cells of one column by their places and what is wrong; the first few, and how many more.
+
+    Parameters
+    ----------
+    path, header : of the column
+    bad : the cells, or the first of them
+    count : how many there are, where these are the first
+    """
     shown = [f"{place}: {header}: {message}" for place, message in bad[:MOST_FAULTS]]
-    more = len(bad) - len(shown)
+    more = (len(bad) if count is None else count) - len(shown)
     return shown + ([f"{at(path)}: {header}: and {more} more"] if more else [])
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import PreflightRecord
@@ -27,7 +29,7 @@ def sign(test: PreflightRecord) -> Iterator[Finding]:
         return
     number = test.cycles.number(record.time)
     # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
-    cycles = [number == k for k in range(test.cycles.count)]
+    cycles = rows_of_cycles(number, test.cycles.count)
     works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
     negative = np.flatnonzero(works < -chance_work(record.displacement, record.force, cycles=1.0))
     if negative.size:
@@ -39,6 +41,20 @@ def sign(test: PreflightRecord) -> Iterator[Finding]:
             unit="J",
             follows="the damper does work on the rig there: check the cell, or leave these cycles out",
         )
+
+
+def rows_of_cycles(number: NDArray[np.int64], count: int) -> list[slice]:
+    """Return the rows of each cycle: a mask each would take as many bytes as there are samples times cycles.
+
+    Parameters
+    ----------
+    number : (n,) cycle of each sample, rising through one run of samples and -1 outside
+    count : of the cycles
+    """
+    inside = np.flatnonzero(number >= 0)
+    first, last = (int(inside[0]), int(inside[-1]) + 1) if inside.size else (0, 0)
+    edges = first + np.searchsorted(number[first:last], np.arange(count + 1))
+    return [slice(int(start), int(end)) for start, end in pairwise(edges)]
 
 
 # --- Units: one read wrongly is most often off by 1000 ---

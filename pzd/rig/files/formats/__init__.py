@@ -3,7 +3,8 @@
 `NEEDS` is the library that reads the format, None where pzd itself needs it anyway; it is imported inside `tables`.
 `OPTIONS` are the keys of `ALL_OPTIONS` that apply to the format; others are refused. A format of loose cells (a
 workbook) has `rows(path)` too, from which `pzd init` guesses the layout. Delimited text alone has `read` instead of
-`tables`: it parses only the columns that are asked for.
+`tables`: it parses only the columns that are asked for. A format with `APART = True` is read in a child process, with
+limits: its library is at the mercy of the file.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pzd.rig.config import FilesEntry
+from pzd.rig.files.child import as_plain, read_in_child
 from pzd.rig.files.sheet import FileTable, Sheet, Wanted, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
+
+if TYPE_CHECKING:  # the child has no use for it, and its import takes long
+    from pzd.rig.config import FilesEntry
 
 TEXT = "text"
 """Format of files that no other format recognises by their content or their ending."""
@@ -81,7 +85,7 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
     """
     module = formats()[format_of(path, entry.format, place)]
     idle = [
-        k for k in ALL_OPTIONS if k not in module.OPTIONS and getattr(entry, k) != FilesEntry.model_fields[k].default
+        k for k in ALL_OPTIONS if k not in module.OPTIONS and getattr(entry, k) != type(entry).model_fields[k].default
     ]
     if idle:
         raise ConfigError(f"{place}.{key}: {module.KIND} has nothing of the kind ({at(path)})" for key in idle)
@@ -98,7 +102,11 @@ def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTab
     ------
     DataError : when the library of the format cannot read it
     """
-    found: list[FileTable] = _by_library(path, module, lambda: module.tables(path, entry))
+    found: list[FileTable]
+    if getattr(module, "APART", False):
+        found = read_in_child(path, module, "tables", as_plain(ALL_OPTIONS, entry))
+    else:
+        found = by_library(path, module, lambda: module.tables(path, entry))
     return found
 
 
@@ -111,11 +119,11 @@ def rows_in(path: Path, module: ModuleType) -> dict[str, list[list[str]]] | None
     """
     if not hasattr(module, "rows"):
         return None
-    found: dict[str, list[list[str]]] = _by_library(path, module, lambda: module.rows(path))
+    found: dict[str, list[list[str]]] = read_in_child(path, module, "rows")
     return found
 
 
-def _by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
+def by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
     """Read a file by a format's library; a damaged file makes these libraries raise anything."""
     try:
         with redirect_stdout(StringIO()):  # some libraries print what they stumble over

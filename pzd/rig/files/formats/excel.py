@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import FileTable, cells_of, spelled
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")
 NEEDS = "openpyxl"
 OPTIONS = ("skip", "header", "units_row", "table")
+APART = True
 
 
 def holds(path: Path, start: bytes) -> bool:

@@ -7,15 +7,18 @@ characters, and a matrix turned over, which does not matter: the longer side is 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import FileTable, tables_of_tree
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "an HDF5 file"
 SUFFIXES = (".h5", ".hdf5", ".hdf")
 NEEDS = "h5py"
 OPTIONS = ("table",)
+APART = True
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
 

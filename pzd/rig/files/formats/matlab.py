@@ -7,15 +7,19 @@ MATLAB's own classes (table, timeseries) are not stored openly: save their colum
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import FileTable, tables_of_tree
 from pzd.schema.errors import DataError, at
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "a MATLAB file"
 SUFFIXES = (".mat",)
 NEEDS = None
 OPTIONS = ("table",)
+APART = True
 
 
 def holds(path: Path, start: bytes) -> bool:

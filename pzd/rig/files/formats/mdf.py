@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from traceback import walk_tb
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import Cells, FileTable, tables_by_length
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")
 NEEDS = "asammdf"
 OPTIONS = ("table",)
+APART = True
 CLOCK = "time"
 """Header of the clock where the master channel has no name."""
 TIME_MASTER = 1

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import FileTable, cells_of
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "a Parquet file"
 SUFFIXES = (".parquet", ".pq")
 NEEDS = "pyarrow"
 OPTIONS = ()
+APART = True
 
 
 def holds(path: Path, start: bytes) -> bool:

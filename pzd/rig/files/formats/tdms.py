@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import Cells, FileTable, cells_of, tables_by_length
 from pzd.schema.errors import DataError, at
+
+if TYPE_CHECKING:
+    from pzd.rig.config import FilesEntry
 
 KIND = "a TDMS file"
 SUFFIXES = (".tdms",)
 NEEDS = "nptdms"
 OPTIONS = ("table",)
+APART = True
 CLOCK = "time"
 """Header of the clock of a group of waveforms, which has no channel of its own."""
 

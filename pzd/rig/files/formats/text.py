@@ -9,8 +9,10 @@ from __future__ import annotations
 import csv
 import io
 import re
+from array import array
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +37,8 @@ _EVENT_SEPARATOR = "\x1e"
 """Replaces a separator inside an event, which no logger quotes."""
 _UNQUOTED = "\x1f"
 """Separator of lines that were taken out of their quotes."""
+_AT_A_TIME, _CHARACTERS = 4096, 65536
+"""Lines and characters that are held at a time as strings of a line or a cell, which take many times the file."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
 
@@ -67,10 +71,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     ------
     DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
     """
-    text = text_of(path, entry.encoding)
-    below = text[after_lines(text, entry.skip) :]
-    quoted = entry.comment is not None or '"' in text
-    lines = _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
+    lines = _lines_of(path, entry, wanted)
     heads, body, numbers = lines.heads, lines.body, lines.numbers
     header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
     header_line = None
@@ -102,6 +103,14 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
 
 
+def _lines_of(path: Path, entry: FilesEntry, wanted: Wanted) -> _Lines:
+    """Take a file apart; its text is let go of as soon as that is done, for it is copied more than once."""
+    text = text_of(path, entry.encoding)
+    below = text[after_lines(text, entry.skip) :]
+    quoted = entry.comment is not None or '"' in text
+    return _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
+
+
 def _plain_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     """Take apart a file without quotes and comments, quickly: its body is parsed as it stands."""
     text = text.rstrip("\n")
@@ -119,27 +128,48 @@ def _plain_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
 
 def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     """Take apart a file with quotes or comments, by the csv module, and put it together without them."""
-    numbered = [
-        (number, line)
-        for number, line in enumerate(text.split("\n"), start=entry.skip + 1)
-        if entry.comment is None or not line.lstrip().startswith(entry.comment)
-    ]
-    while numbered and not numbered[-1][1].strip():
-        numbered.pop()
-    first = numbered[0][1] if numbered else ""
-    separator = entry.separator or _separator_of(first, wanted.known, entry.decimal)
-    if separator == BLANKS:
-        rows = [line.split() for _, line in numbered]
-    else:
-        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for _, line in numbered]
+    numbered = _numbered_lines(entry, text)
+    first = next(numbered, None)
+    separator = entry.separator or _separator_of(first[1] if first else "", wanted.known, entry.decimal)
     above = (entry.header is None) + entry.units_row
-    return _Lines(
-        [[cell.strip() for cell in row] for row in rows[:above]],
-        "\n".join(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row) for row in rows[above:]),
-        np.array([number for number, _ in numbered[above:]], dtype=np.int64),
-        np.array([len(row) for row in rows[above:]], dtype=np.int64),
-        _UNQUOTED,
-    )
+    heads: list[list[str]] = []
+    numbers, fields = array("q"), array("q")  # a list of as many numbers takes five times the memory
+    blocks: list[str] = []
+    block: list[str] = []
+    for number, line in chain([first] if first else [], numbered):
+        if separator == BLANKS:
+            row = line.split()
+        else:
+            row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        if len(heads) < above:
+            heads.append([cell.strip() for cell in row])
+            continue
+        numbers.append(number)
+        fields.append(len(row))
+        block.append(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row))
+        if len(block) == _AT_A_TIME:
+            blocks.append("\n".join(block))
+            block.clear()
+    body = "\n".join([*blocks, "\n".join(block)] if block else blocks)
+    return _Lines(heads, body, np.array(numbers, dtype=np.int64), np.array(fields, dtype=np.int64), _UNQUOTED)
+
+
+def _numbered_lines(entry: FilesEntry, text: str) -> Iterator[tuple[int, str]]:
+    """Yield each line that is no comment with its number, without the empty lines at the end."""
+    empty: list[tuple[int, str]] = []
+    number, start = entry.skip, 0
+    while start <= len(text):
+        end = text.find("\n", start + _CHARACTERS)
+        end = len(text) if end < 0 else end
+        for line in text[start:end].split("\n"):
+            number += 1
+            if entry.comment is not None and line.lstrip().startswith(entry.comment):
+                continue
+            empty.append((number, line))
+            if line.strip():
+                yield from empty
+                empty.clear()
+        start = end + 1
 
 
 def _separator_of(line: str, known: Collection[str], decimal: str) -> str:
@@ -242,10 +272,13 @@ class _Table:
             return self._cell_by_cell(columns)
         values = {column: frame[column].to_numpy() for column in columns}
         infinite = {
-            column: [(int(row), "a finite number is needed (got inf)") for row in np.flatnonzero(np.isinf(cells))]
-            for column, cells in values.items()
+            column: np.flatnonzero(np.isinf(cells)) for column, cells in values.items() if np.isinf(cells).any()
         }
-        return values, {column: self._faults(column, bad) for column, bad in infinite.items() if bad}
+        wrong = "a finite number is needed (got inf)"
+        return values, {
+            column: self._faults(column, [(int(row), wrong) for row in rows[:MOST_FAULTS]], rows.size)
+            for column, rows in infinite.items()
+        }
 
     def texts(self, column: int) -> list[str]:
         """Return the cells of one column, stripped; empty where a line ends before it."""
@@ -257,7 +290,7 @@ class _Table:
         import pandas as pd
 
         return pd.read_csv(
-            io.StringIO(self.body),
+            io.BytesIO(self.body.encode()),  # a StringIO takes four bytes for each character
             sep=r"\s+" if self.separator == BLANKS else self.separator,
             decimal=self.decimal,
             header=None,
@@ -287,16 +320,16 @@ class _Table:
                     bad.append(row)
             if bad:
                 advice = _advice([cells[row] for row in bad])
-                wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad]
-                faults[column] = self._faults(column, wrong)
+                wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad[:MOST_FAULTS]]
+                faults[column] = self._faults(column, wrong, len(bad))
             else:
                 found[column] = values
         return found, faults
 
-    def _faults(self, column: int, bad: Sequence[tuple[int, str]]) -> list[str]:
-        """List bad cells, by row and what is wrong."""
-        places = [(at(self.path, int(self.lines[row])), message) for row, message in bad]
-        return listed_faults(self.path, self.header[column], places)
+    def _faults(self, column: int, first: Sequence[tuple[int, str]], count: int) -> list[str]:
+        """List the first bad cells, by row and what is wrong, and how many there are in all."""
+        places = [(at(self.path, int(self.lines[row])), message) for row, message in first]
+        return listed_faults(self.path, self.header[column], places, count)
 
 
 def _number(cell: str, decimal: str) -> float:
