@@ -9,7 +9,7 @@ import numpy as np
 from pzd.record import Array, Record
 from pzd.report.blocks import number
 from pzd.report.context import ReportContext
-from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend
+from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend, ticks_named
 from pzd.report.rig_tests import settled
 from pzd.signals.measures import criterion
 
@@ -58,9 +58,11 @@ def held_out_records(context: ReportContext) -> Iterator[Panel]:
     names = [record.name for record in records]
     before, after = np.array([record_gap(context, record) for record in records]).T
     figure, ax = axes(1.0 + 0.26 * max(len(names), 3), names)
-    ax.hlines(names, after, before, color=MUTED, linewidth=2.0)
-    ax.plot(before, names, "o", color=BASELINE, label="before")
-    ax.plot(after, names, "s", color=FINAL, label="after")
+    rows = np.arange(len(names))
+    ax.hlines(rows, after, before, color=MUTED, linewidth=2.0)
+    ax.plot(before, rows, "o", color=BASELINE, label="before")
+    ax.plot(after, rows, "s", color=FINAL, label="after")
+    ticks_named(ax, names)
     ax.set_xlim(0.0, 1.1 * float(max(before.max(), after.max())))
     ax.set_xlabel("W_s [-]")
     ax.margins(y=0.25)
@@ -143,7 +145,7 @@ def _map_panel(
     figure, ax = axes(1.5 + 0.3 * max(len(groups), 4), groups, key=0, right=0.75)
     rows = np.arange(len(groups) + 1)
     mesh = ax.pcolormesh(edges, rows, values, cmap=MAP, vmin=0.0, vmax=top, edgecolors="face", linewidth=0.9)
-    ax.set_yticks(np.arange(len(groups)) + 0.5, list(groups))
+    ticks_named(ax, list(groups), 0.5)
     ax.set_xlabel("velocity [m/s]")
     ax.grid(visible=False)
     box = ax.get_position()
@@ -170,7 +172,8 @@ def ranking(context: ReportContext) -> Iterator[Panel]:
         return
     figure, ax = axes(1.0 + 0.26 * max(len(ranked), 3), [r.effect for r in ranked])
     colours = [FINAL if r.effect in diagnosis.effects else MUTED for r in ranked]
-    ax.barh([r.effect for r in ranked], [r.gap_after for r in ranked], color=colours, height=0.62)
+    ax.barh(np.arange(len(ranked)), [r.gap_after for r in ranked], color=colours, height=0.62)
+    ticks_named(ax, [r.effect for r in ranked])
     ax.locator_params(axis="x", nbins=4)
     ax.set_xlabel("W_s left on the tests seen [-]")
     ax.grid(visible=False, axis="y")
