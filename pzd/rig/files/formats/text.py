@@ -97,6 +97,10 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     table = _Table(path, tuple(header), body, numbers, lines.separator, entry.decimal)
     dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
     values, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
+    rest = (i for i in range(len(header)) if i not in (*dated, *values, *faults))
+    for column in [i for i in rest if wanted.as_numbers(header[i])]:
+        more, bad = table.numbers([column])
+        values, faults = values | more, faults | bad
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
     steps = tuple(_steps(entry, header, wanted, numbers))
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
