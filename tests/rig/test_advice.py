@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write
 
 from pzd.rig.files.guess import guessed
-from pzd.schema.errors import DataError
+from pzd.schema.errors import DataError, UserError
 
 # ---------------------------------------------------------------- columns and headers
 
@@ -136,3 +137,110 @@ def test_a_hundred_thousand_brackets_are_refused(tmp_path: Path, bracket: str, n
     assert f"{name}:1: lists and objects nested too deep" in said
     with pytest.raises(DataError):
         guessed([tmp_path / name])
+
+
+# ---------------------------------------------------------------- every other refusal: what it says to do is done
+
+Remedy = dict[str, Any]
+NAMED = {"t": TIME, "pos": X, "load": FORCE}
+READ = {"columns": {"time": "t", "displacement": "pos", "force": "load"}}
+SI = {"units": {"time": "s", "displacement": "m", "force": "N"}}
+WITHOUT = {name: values for name, values in CANONICAL.items() if name != "voltage_V"}
+START = datetime(2024, 2, 12, 23, 59, 59, 500000)  # noqa: DTZ001  # a logger knows no zone
+DAYS = [(START + timedelta(seconds=t)).strftime("%d/%m/%Y %H:%M:%S.%f") for t in TIME.tolist()]
+
+REFUSED: dict[str, tuple[list[str], Remedy, str, Remedy]] = {
+    "the unit of a header is missing": (lines(NAMED), READ, r"units: \{displacement: m\}", READ | SI),
+    "a misspelt header": (
+        lines(NAMED),
+        READ | SI | {"columns": READ["columns"] | {"force": "Load"}},
+        r"columns: \{force: load\}",
+        READ | SI,
+    ),
+    "millimetres": (
+        lines(WITHOUT | {"displacement_m": X * 1e3}),
+        {},
+        r"say units: \{displacement: mm\}",
+        {"units": {"displacement": "mm"}},
+    ),
+    "the sign": (lines(WITHOUT | {"force_N": -FORCE}), {}, r"say sign: \{force: -1\}", {"sign": {"force": -1}}),
+    "the sign, turned in vain": (
+        lines(WITHOUT),
+        {"sign": {"force": -1}},
+        r"say sign: \{force: 1\}",
+        {"sign": {"force": 1}},
+    ),
+    "decimal commas": (lines(WITHOUT, ";", ","), {}, "decimal: ','", {"decimal": ","}),
+    "blanks": (lines(WITHOUT, " "), {}, "say separator: ' '", {"separator": " "}),
+    "a row of units": (
+        [lines(NAMED)[0], "s,m,N", *lines(NAMED)[1:]],
+        READ | SI,
+        "say units_row: true",
+        READ | {"units_row": True},
+    ),
+    "a preamble": (["Stand 7", *["of the lab"] * 6, *lines(WITHOUT)], {}, "say skip: ", {"skip": 7}),
+    "an empty line above": (["", *lines(WITHOUT)], {}, "say skip: N where N lines", {"skip": 1}),
+    "given twice": (
+        lines(CANONICAL),
+        {"constants": {"voltage": "50 V"}},
+        r"columns: \{voltage: ''\}",
+        {"constants": {"voltage": "50 V"}, "columns": {"voltage": ""}},
+    ),
+    "no unit of the name": (
+        lines(WITHOUT),
+        {"pattern": "^(?P<voltage>a|5)"},
+        "say voltage: V",
+        {"pattern": "(?P<voltage>5)", "units": {"voltage": "V"}},
+    ),
+    "a constant without its unit": (
+        lines(WITHOUT),
+        {"constants": {"voltage": "5"}},
+        "like '1.5 V'",
+        {"constants": {"voltage": "1.5 V"}},
+    ),
+    "days and months": (
+        lines({"when": DAYS, "displacement_m": X, "force_N": FORCE}),
+        {"columns": {"time": "when"}, "units": {"time": "%m/%d/%Y %H:%M:%S.%f"}},
+        r'say units: \{time: "%d/%m/%Y %H:%M:%S.%f"\}',
+        {"columns": {"time": "when"}, "units": {"time": "%d/%m/%Y %H:%M:%S.%f"}},
+    ),
+    "no time": (lines({"displacement_m": X, "force_N": FORCE}), {}, "say rate_Hz: N for N samples", {"rate_Hz": 500.0}),
+    "creeping seconds": (
+        lines(WITHOUT | {"time_s": TIME * 1e3}),
+        {},
+        r"say units: \{time: ms\}",
+        {"units": {"time": "ms"}},
+    ),
+    "creeping seconds that are some": (
+        lines(WITHOUT | {"time_s": TIME * 1e3}),
+        {},
+        r"units: \{time: s\}",
+        {"units": {"time": "s"}},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_a_refusal_says_to_do_is_accepted(tmp_path: Path, case: str) -> None:
+    rows, entry, advice, remedy = REFUSED[case]
+    write(tmp_path / "5.csv", rows)
+    with pytest.raises(UserError) as caught:
+        run(tmp_path, {"path": "5.csv", **entry})
+    said = "\n".join(caught.value.messages)
+    assert re.search(advice, said), said
+    assert len(run(tmp_path, {"path": "5.csv", **remedy}).records) == 1
+
+
+def test_an_encoding_that_is_advised_reads_the_file(tmp_path: Path) -> None:
+    for encoding in ("utf-16", "latin-1"):
+        write(tmp_path / "a.csv", lines(WITHOUT | {"Temp \u00b0": TIME}), encoding)
+        (said,) = refused(tmp_path)
+        (advised,) = re.findall("encoding: (.*)$", said)
+        assert len(run(tmp_path, {"path": "a.csv", "encoding": advised}).records) == 1
+
+
+def test_the_advice_of_a_finding_is_accepted(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL | {"velocity_m_per_s": 2.0 * np.gradient(X, TIME)}))
+    (told,) = run(tmp_path).entries[0].findings
+    assert told.follows.endswith("say columns: {velocity: ''} to have it derived")
+    assert run(tmp_path, {"path": "a.csv", "columns": {"velocity": ""}}).entries[0].findings == ()

@@ -215,17 +215,30 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
                 found.append(_Source(spec, columns[0], unit))
         elif spec.named or spec.quantity in NEEDED:
             data_faults.append(_missing(sheet, spec, layout.place))
-    if data_faults and layout.entry.header is None and all(_NUMBER.fullmatch(head) for head in sheet.header if head):
-        shown = [*(quantity.column for quantity in NEEDED), *(f"column{n}" for n in range(4, len(sheet.header) + 1))]
-        raise DataError(
-            f"{sheet.top}: numbers stand where the headers should; name the columns in their order, e.g. "
-            f"header: [{', '.join(shown[: len(sheet.header)])}] (got {', '.join(sheet.header)})"
-        )
+    if data_faults:
+        _refuse_no_header(sheet, layout)
     if config_faults:
         raise ConfigError(config_faults)
     if data_faults:
         raise DataError(data_faults)
     return found
+
+
+def _refuse_no_header(sheet: Sheet, layout: Layout) -> None:
+    """Refuse a sheet whose first line names no columns: it is one column to the separator, or holds numbers.
+
+    Raises
+    ------
+    DataError : with the key that reads it
+    """
+    got = f"(got {', '.join(sheet.header)})"
+    if len(sheet.header) == 1 and len(sheet.header[0].split()) >= len(NEEDED):
+        say = "the header is one column; if blanks stand between the fields, say separator: ' '"
+        raise DataError(f"{sheet.top}: {say} {got}")
+    if layout.entry.header is None and all(_NUMBER.fullmatch(head) for head in sheet.header if head):
+        shown = [*(quantity.column for quantity in NEEDED), *(f"column{n}" for n in range(4, len(sheet.header) + 1))]
+        say = f"name the columns in their order, e.g. header: [{', '.join(shown[: len(sheet.header)])}]"
+        raise DataError(f"{sheet.top}: numbers stand where the headers should; {say} {got}")
 
 
 def _unit(sheet: Sheet, column: int, spec: ChannelSpec) -> str | None:
@@ -248,6 +261,8 @@ def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
         hint = (
             f"; it stands in table {sheet.elsewhere[wanted]!r}, which has another clock or length: export them as one"
         )
+    elif not hint and spec.quantity is TIME:
+        hint = "; where no column holds the time, say rate_Hz: N for N samples a second"
     elif not hint and spec.quantity is FORCE:
         hint = "; without force no damper: if another column holds it, say columns: {force: HEADER}"
     return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
@@ -263,6 +278,11 @@ def _clock(sheet: Sheet, layout: Layout, found: list[_Source]) -> dict[Quantity,
     if clock.dated or clock.column in sheet.faults or (np.abs(sheet.numbers[clock.column]) > LARGEST).any():
         return {}
     return {TIME: sheet.numbers[clock.column]}
+
+
+def day_and_month_exchanged(form: str) -> str:
+    """Return a format of dates with day and month the other way round."""
+    return re.sub("%[dm]", lambda code: {"%d": "%m", "%m": "%d"}[code[0]], form)
 
 
 def instants(sheet: Sheet, column: int, form: str) -> Array:
@@ -285,6 +305,12 @@ def instants(sheet: Sheet, column: int, form: str) -> Array:
     bad = np.flatnonzero(found.isna().to_numpy())
     if bad.size:
         row = int(bad[0])
+        swapped = day_and_month_exchanged(form)
+        if swapped != form and not pd.to_datetime(pd.Series(cells), format=swapped, errors="coerce").isna().any():
+            raise DataError(
+                f"{sheet.place(row)}: {sheet.header[column]}: day and month are exchanged: say units: "
+                f"{{time: {written(swapped)}}} (got {cells[row]!r})"
+            )
         more = f" ({bad.size} such cells)" if bad.size > 1 else ""
         raise DataError(
             f"{sheet.place(row)}: {sheet.header[column]}: no date and time like {form}{more} (got {cells[row]!r})"

@@ -13,7 +13,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.quantities import DISPLACEMENT, TIME
 from pzd.record import Array, clock_fault
-from pzd.rig.files.channels import RawRecord, instants
+from pzd.rig.files.channels import RawRecord, day_and_month_exchanged, instants
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.sheet import Sheet
 from pzd.schema.errors import DataError
@@ -91,7 +91,7 @@ def _days_first(sheet: Sheet, layout: Layout, longest: float) -> str | None:
     column = next((i for i, head in enumerate(sheet.header) if spec and head in spec.headers), None)
     if spec is None or spec.unit is None or column is None:
         return None
-    swapped = spec.unit.translate(str.maketrans("dm", "md"))
+    swapped = day_and_month_exchanged(spec.unit)
     try:
         seconds = instants(sheet, column, swapped)
     except DataError:

@@ -147,7 +147,8 @@ def _too_large(test: RawRecord) -> list[str]:
     if np.ptp(x) > LONGEST_STROKE:
         row = int(np.argmax(np.abs(x - x[0])))
         found.append(
-            f"{test.place(row)}: a stroke of {np.ptp(x):.4g} m, above {LONGEST_STROKE:g} m; are these millimetres?"
+            f"{test.place(row)}: a stroke of {np.ptp(x):.4g} m, above {LONGEST_STROKE:g} m; are these millimetres? "
+            "say units: {displacement: mm}"
         )
     speeds = [(slope(time, x), "displacement over time gives")]
     if VELOCITY in test.channels:

@@ -144,7 +144,7 @@ def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
         where=f"the whole record, {where}",
         size=gain if abs(gain - 1.0) > GAIN else rest,
         unit="-",
-        follows=f"{cause}; leave the column out to have it derived",
+        follows=f"{cause}; say columns: {{velocity: ''}} to have it derived",
     )
 
 

@@ -37,6 +37,8 @@ _UNQUOTED = "\x1f"
 """Separator of lines that were taken out of their quotes."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
+_UNIT_CELL = re.compile(r"[\[(]?\s*[A-Za-z\u00b5\u00b0%][A-Za-z0-9\u00b5\u00b0%/*^ ]{0,12}[\])]?")
+"""A cell that may be a unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +293,8 @@ class _Table:
                     bad.append(row)
             if bad:
                 advice = _advice([cells[row] for row in bad])
+                if bad == [0] and _UNIT_CELL.fullmatch(cells[0]):
+                    advice = "; if this row holds the units, say units_row: true"
                 wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad]
                 faults[column] = self._faults(column, wrong)
             else:
