@@ -96,6 +96,8 @@ class Plot:
 _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
 """Width of a letter of a tick label."""
+_LONGEST_LABEL = 28
+"""Letters of a tick label: half of the width stays for the axes."""
 _LEGEND_COLUMNS = 4
 _LONGEST_LABEL = 34
 """Characters of a label of the vertical axis."""
@@ -127,15 +129,29 @@ def axes(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_WIDTH_IN, height))
-    left = 0.33 + _LETTER_IN * max(len(label) for label in labels)
+    left = 0.33 + _LETTER_IN * max(len(shortened(label)) for label in labels)
     below, above = 0.5, 0.1 + 0.21 * key
     box = (left / _WIDTH_IN, below / height, 1.0 - (left + right) / _WIDTH_IN, 1.0 - (below + above) / height)
     return figure, figure.add_axes(box, xlabel=x, ylabel=y)
 
 
 def shortened(label: str) -> str:
-    """Return the end of a label that would leave no room for the picture."""
-    return label if len(label) <= _LONGEST_LABEL else f"...{label[3 - _LONGEST_LABEL :]}"
+    """Return a label that leaves room for the plot beside it: names of files differ at their ends, so the middle goes.
+
+    Examples
+    --------
+    >>> shortened("damper_12_after_endurance_run_sine_2Hz_150V")
+    'damper_12_aft…_sine_2Hz_150V'
+    """
+    if len(label) <= _LONGEST_LABEL:
+        return label
+    half = (_LONGEST_LABEL - 1) // 2
+    return f"{label[:half]}…{label[half + 1 - _LONGEST_LABEL :]}"
+
+
+def ticks_named(ax: Axes, labels: Sequence[str], first: float = 0.0) -> None:
+    """Name the rows of a plot, one a unit of its vertical axis, however alike their names are."""
+    ax.set_yticks(np.arange(len(labels)) + first, [shortened(label) for label in labels])
 
 
 def legend(figure: Figure, columns: int = 3) -> None:

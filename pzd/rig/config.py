@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pzd.quantities import CHANNELS, VOLTAGE, Control
+from pzd.quantities import CHANNELS, DAMPING, FRICTION, STIFFNESS, VOLTAGE, Control
 from pzd.rig.stand.config import VirtualEntry
-from pzd.schema.model import Frozen
+from pzd.schema.model import Frozen, all_keys
 
 
 def _text(value: object) -> object:
@@ -37,6 +38,19 @@ WithUnit = Annotated[str, BeforeValidator(_text)]
 """A number with its unit, like `100 V`."""
 
 
+@lru_cache(maxsize=1)
+def own_words() -> frozenset[str]:
+    """Return the names that no control signal may have: in a file they could not be told from pzd's own."""
+    from pzd.damper.effects import library
+
+    effects = library().values()
+    parameters = [parameter.name for effect in effects for parameter in effect.parameters]
+    base = [quantity.name for quantity in (FRICTION, DAMPING, STIFFNESS)]
+    words = [*base, *parameters, *(effect.name for effect in effects), *all_keys()]
+    # A parameter F_0 is read as that of a control called F, and a key `units` as several of a control called unit.
+    return frozenset(stem for word in words for stem in (word, re.sub(r"s?(?:_\d+)?$", "", word)))
+
+
 class ControlConfig(Frozen):
     """The control signal of the valve."""
 
@@ -57,6 +71,10 @@ class ControlConfig(Frozen):
     def _not_another_channel(cls, name: str) -> str:
         if name in {channel.name for channel in CHANNELS} - {VOLTAGE.name}:
             raise ValueError(f"{name} is another channel of the rig; the control needs a name of its own")
+        if name != VOLTAGE.name and name in own_words():
+            raise ValueError(
+                f"{name} is a key or a parameter of pzd; the control needs a name of its own, e.g. {name}_in"
+            )
         return name
 
     def signal(self) -> Control:

@@ -82,8 +82,10 @@ class Run:
 
         Raises
         ------
-        ConfigError : when the folder holds the results of another config of the same stem
+        ConfigError : when the folder holds the results of another config of the same stem, or the stem names none
         """
+        if not config.stem.strip("."):
+            raise ConfigError(f"{config}: the results would lie outside of a folder of their own; rename the config")
         run = cls(runs / config.stem, config, control)
         for manifest in sorted(run.folder.glob(f"*/{MANIFEST}")):
             owner = run._owner(manifest.parent.name)

@@ -97,6 +97,12 @@ def nearest(given: str, valid: Iterable[str]) -> str | None:
     return lower[found[0]] if found else None
 
 
+def all_keys(block: type[Frozen] = Frozen) -> set[str]:
+    """Return the keys of every block that is declared so far."""
+    blocks = block.__subclasses__()
+    return {key for one in blocks for key in one.model_fields} | {key for one in blocks for key in all_keys(one)}
+
+
 def keys_at(annotation: Any, path: KeyPath, data: Any) -> list[str]:
     """Return the keys of the model in the mapping at a path of the data."""
     return list(dict.fromkeys(key for one in _models_at(annotation, path, data) for key in one.model_fields))

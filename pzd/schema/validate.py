@@ -191,6 +191,11 @@ def _shown(value: Any) -> str:
 # --- Names of the control signal: `voltage_V` in the code, `current_A` in files where the config says so ---
 
 
+_WITH_UNIT, _WITHOUT_UNIT = "(?:at|between|end|from|passive|sd|start|to)_", "(?:best_fixed|fixed|left_out)_"
+_BEHIND_CONTROL = r"s?(?:_\d+)?"
+"""What stands around the name of the control in a key: one called u is no part of `unit`, s is none of `from_s`."""
+
+
 def canonical(name: str, control: Control) -> str:
     """Return the canonical name of a column or key that bears the name of the control.
 
@@ -202,9 +207,12 @@ def canonical(name: str, control: Control) -> str:
     if control == Control():
         return name
     unit = control.quantity.column.removeprefix(control.name)
-    candidate = re.sub(rf"(?<![A-Za-z]){re.escape(control.name)}", VOLTAGE.name, name)
-    if unit and candidate.endswith(unit):
-        candidate = f"{candidate.removesuffix(unit)}_{VOLTAGE.unit}"
+    whole = rf"{re.escape(control.name)}({_BEHIND_CONTROL})"
+    found = re.fullmatch(rf"({_WITH_UNIT}|){whole}({re.escape(unit)})", name)
+    found = found or re.fullmatch(rf"({_WITHOUT_UNIT}|){whole}()", name)
+    if found is None:
+        return name
+    candidate = f"{found[1]}{VOLTAGE.name}{found[2]}" + (f"_{VOLTAGE.unit}" if found[3] else "")
     return candidate if control.renamed(candidate) == name else name
 
 

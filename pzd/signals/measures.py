@@ -139,3 +139,21 @@ def chance_work(displacement: Array, force: Array, cycles: float | None = None) 
     """
     of_cycle = CHANCE_WORK * float(np.ptp(displacement) * np.subtract(*np.percentile(force, (99, 1))))
     return of_cycle * float(np.sqrt(1.0 + 0.5 * len(reversals(displacement)) if cycles is None else cycles))
+
+
+def slope(time: Array, x: Array) -> Array:
+    """Compute the slope (n,) of a motion over four samples, insensitive to spikes of one or two."""
+    if time.size < 6:
+        return np.gradient(x, time)
+    clean = despiked(x)
+    step = float(np.median(np.diff(time)))
+    span = np.maximum(time[4:] - time[:-4], 4.0 * step)
+    return np.pad((clean[4:] - clean[:-4]) / span, 2, mode="edge")
+
+
+def despiked(x: Array) -> Array:
+    """Return the running median (n,) of five samples."""
+    if x.size < 5:
+        return x
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
+    return np.concatenate((middle[:1], middle[:1], middle, middle[-1:], middle[-1:]))

@@ -13,7 +13,8 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array, Record
 from pzd.report.damper_models import DamperModels
-from pzd.report.plots.gap import record_gap
+from pzd.report.drawing import encoded
+from pzd.report.plots.gap import held_out_records, record_gap
 from pzd.report.plots.residuals import between_cycles, fit_alone, quantiles, spectra
 
 RATE = 500.0
@@ -87,3 +88,20 @@ def test_each_test_fitted_alone_has_its_own_friction() -> None:
     found = fit_alone(context_of(*records))
     assert [test.over["order of the files"] for test in found] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert [test.row.T0_N for test in found] == pytest.approx(list(300.0 * 1.1 ** np.arange(5)), rel=0.01)
+
+
+def test_names_of_sixty_letters_leave_room_for_the_plot_and_stay_apart() -> None:
+    """A label as wide as the page gave axes of a negative width, and the report ended with a fault."""
+    stems = [f"damper_12_after_endurance_run_at_the_second_stand_of_plant_{n}" for n in (1, 2, 3)]
+    force = 1000.0 * np.sign(np.cos(2.0 * np.pi * np.arange(2000) / RATE))
+    records = [sine(force, name=stem) for stem in stems]
+    context = context_of(*records, baseline=0.9 * force, final=force)
+    context.damper = SimpleNamespace(extended=True, residuals=context.damper.residuals)
+    context.diagnosed = SimpleNamespace(diagnosis=SimpleNamespace(gap=SimpleNamespace(held_out=stems)))
+    (panel,) = held_out_records(context)
+    (ax,) = panel.figure.axes
+    shown = [label.get_text() for label in ax.get_yticklabels()]
+    assert len(set(shown)) == 3
+    assert all(label.startswith("damper_12_") and label[-1] in "123" for label in shown)
+    assert ax.get_position().width > 0.3
+    assert encoded(panel).source.startswith("data:image/svg+xml")

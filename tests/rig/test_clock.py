@@ -1,12 +1,15 @@
-"""Stamps of few digits: the clock behind them is found, and a clock that wavers is left as it is."""
+"""Clocks: stamps of few digits, and those that contradict the config, count samples, jump or exchange day and month."""
 
 from __future__ import annotations
 
+import re
+from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from written_files import lines, run, write
+from written_files import FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.damper.element import element_force
 from pzd.record import Array
@@ -55,3 +58,117 @@ def test_a_clock_that_is_not_rounded_is_left_as_it_is(tmp_path: Path, clock: str
     rig = run(tmp_path)
     np.testing.assert_allclose(rig.records[0].time, time, atol=1e-8)
     assert not [row for row in rig.ingested if row.step == "clock"]
+
+
+# ---------------------------------------------------------------- clocks that contradict the config or count samples
+
+WITHOUT_TIME = {"displacement_m": X, "force_N": FORCE}
+
+
+@pytest.mark.parametrize(("header", "scale"), [("time_s", 1.0), ("t", 1e3), ("Time [ms]", 1e3), ("Zeit [s]", 1.0)])
+def test_a_rate_beside_a_column_of_time_is_refused_where_they_differ(tmp_path: Path, header: str, scale: float) -> None:
+    """Counted at 1250 Hz, a record of 500 Hz is 2.5 times as quick, and C 0.4 of what it is."""
+    write(tmp_path / "a.csv", lines({header: TIME * scale, **WITHOUT_TIME}))
+    (said,) = wrong(tmp_path, {"path": "a.csv", "rate_Hz": 1250.0})
+    assert "rig.files.0.rate_Hz: column" in said
+    assert "(got 1250)" in said
+    # Each of the two remedies is accepted.
+    entry: dict[str, Any] = {"path": "a.csv"} | ({} if header == "time_s" else {"columns": {"time": header}})
+    if header == "t":
+        entry["units"] = {"time": "ms"}
+    assert run(tmp_path, entry).records[0].rate == pytest.approx(500.0)
+    (counted,) = run(tmp_path, {"path": "a.csv", "rate_Hz": 1250.0, "columns": {"time": ""}}).entries
+    assert counted.rate_Hz == pytest.approx(1250.0)
+    assert "clock" in [finding.check for finding in counted.findings]
+
+
+@pytest.mark.parametrize("column", ["agrees", "rounded", "counts", "dates"])
+def test_a_rate_beside_a_column_that_does_not_contradict_it_stands(tmp_path: Path, column: str) -> None:
+    stamps: dict[str, Any] = {
+        "agrees": TIME,
+        "rounded": np.round(TIME, 2),
+        "counts": np.arange(TIME.size),
+        "dates": [f"25.03.2024 10:00:{t:06.3f}" for t in TIME],
+    }
+    write(tmp_path / "a.csv", lines({"Time [s]": stamps[column], **WITHOUT_TIME}))
+    (entry,) = run(tmp_path, {"path": "a.csv", "rate_Hz": 500.0}).entries
+    assert entry.findings == ()
+
+
+def test_numbers_of_samples_are_no_seconds(tmp_path: Path) -> None:
+    """Read as seconds, samples at 500 Hz make C 500 times as large."""
+    samples = np.arange(TIME.size)
+    write(tmp_path / "a.csv", lines({"Sample": samples, **WITHOUT_TIME}))
+    declared = {"path": "a.csv", "columns": {"time": "Sample"}, "units": {"time": "s"}}
+    (said,) = refused(tmp_path, declared)
+    assert "a.csv:2: time: column 'Sample' counts samples, no seconds; say rate_Hz: N" in said
+    assert run(tmp_path, {"path": "a.csv", "rate_Hz": 500.0}).entries[0].rate_Hz == pytest.approx(500.0)
+    write(tmp_path / "a.csv", lines({"time_s": samples, **WITHOUT_TIME}))
+    (said,) = refused(tmp_path)
+    assert "a.csv:2: the clock counts whole seconds, one a row" in said
+    for remedy, rate in (
+        ({"rate_Hz": 500.0}, 500.0),
+        ({"units": {"time": "ms"}}, 1e3),
+        ({"units": {"time": "s"}}, 1.0),
+    ):
+        (entry,) = run(tmp_path, {"path": "a.csv", **remedy}).entries
+        assert entry.rate_Hz == pytest.approx(rate)
+        assert ("clock" in [finding.check for finding in entry.findings]) == (rate == 1.0)
+
+
+def test_a_jump_of_a_day_is_refused_at_once_and_read_where_it_is_cut(tmp_path: Path) -> None:
+    time = np.where(TIME < 0.5, TIME, TIME + 86400.0)
+    write(tmp_path / "a.csv", lines({"time_s": [f"{t:.3f}" for t in time], **WITHOUT_TIME}))
+    (said,) = refused(tmp_path)
+    assert "a.csv:252: the clock jumps by 86400 s here, in a record of 0.996 s beside" in said
+    (gap,) = re.findall(r"split: \{gap_s: ([0-9.]+)\}", said)
+    assert len(run(tmp_path, {"path": "a.csv", "split": {"gap_s": float(gap)}}).records) == 2
+
+
+def test_dates_whose_day_comes_first_are_refused_over_midnight_with_the_format_that_reads_them(tmp_path: Path) -> None:
+    start = datetime(2024, 2, 1, 23, 59, 59, 500000)  # noqa: DTZ001  # a logger knows no zone
+    stamps = [(start + timedelta(seconds=t)).strftime("%d/%m/%Y %H:%M:%S.%f") for t in TIME.tolist()]
+    write(tmp_path / "a.csv", lines({"when": stamps, **WITHOUT_TIME}))
+    entry = {"path": "a.csv", "columns": {"time": "when"}, "units": {"time": "%m/%d/%Y %H:%M:%S.%f"}}
+    (said,) = refused(tmp_path, entry)
+    assert "a.csv:252: the clock jumps by 2.592e+06 s here" in said
+    (form,) = re.findall(r'say units: \{time: "(.*)"\}', said)
+    (record,) = run(tmp_path, entry | {"units": {"time": form}}).records
+    assert record.time - record.time[0] == pytest.approx(TIME, abs=1e-6)
+
+
+def test_a_pause_within_a_record_is_a_finding_still(tmp_path: Path) -> None:
+    time = np.where(TIME < 0.5, TIME, TIME + 0.4)
+    write(tmp_path / "a.csv", lines({"time_s": time, **WITHOUT_TIME}))
+    assert "dropped samples" in [finding.check for finding in run(tmp_path).entries[0].findings]
+
+
+def test_another_rate_without_a_pause_is_cut_in_the_file(tmp_path: Path) -> None:
+    time = np.concatenate((TIME, TIME[-1] + np.arange(1, 501) * 1e-2))
+    x = 0.01 * np.sin(2.0 * np.pi * 5.0 * time)
+    rows = lines({"time_s": time, "displacement_m": x, "force_N": 900.0 * np.gradient(x, time)})
+    write(tmp_path / "a.csv", rows)
+    (said,) = refused(tmp_path)
+    assert said.endswith(
+        "a.csv:502: the clock goes on at 100 Hz here, at 500 Hz before; a record has one rate: write "
+        "the rows from here on into a file of their own"
+    )
+    write(tmp_path / "a.csv", rows[:501])
+    write(tmp_path / "b.csv", [rows[0], *rows[501:]])
+    assert [round(record.rate) for record in run(tmp_path).records] == [500, 100]
+
+
+def test_a_counted_clock_is_asked_about_no_milliseconds(tmp_path: Path) -> None:
+    """The advice of once, units: {time: ms}, was refused in its turn: said twice, under rate_Hz and units."""
+    write(tmp_path / "a.csv", lines(WITHOUT_TIME))
+    assert run(tmp_path, {"path": "a.csv", "rate_Hz": 0.5}).entries[0].rate_Hz == pytest.approx(0.5)
+
+
+def test_a_clock_of_too_few_digits_is_counted_as_the_refusal_says(tmp_path: Path) -> None:
+    later = 10.0 + np.arange(TIME.size) / 3000.0
+    write(tmp_path / "a.csv", lines({"time_s": [f"{t:.5g}" for t in later], **WITHOUT_TIME}))
+    (said,) = refused(tmp_path)
+    (rate,) = re.findall(r"rate_Hz, about ([0-9.]+) here", said)
+    for columns in ({}, {"columns": {"time": ""}}):
+        (entry,) = run(tmp_path, {"path": "a.csv", "rate_Hz": float(rate), **columns}).entries
+        assert entry.rate_Hz == pytest.approx(3000.0, rel=5e-3)

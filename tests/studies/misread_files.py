@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -107,11 +108,20 @@ def clock(seconds: Array, days: bool = False) -> list[str]:
     ]
 
 
+def days(form: str) -> list[str]:
+    """Dates and times over the midnight from 1 to 2 February."""
+    start = datetime(2024, 2, 1, 23, 59, 58)  # noqa: DTZ001  # a logger knows no zone
+    return [(start + timedelta(seconds=t)).strftime(f"{form} %H:%M:%S.%f") for t in TIME.tolist()]
+
+
 GERMAN = {
     "columns": {"time": "Zeit", "displacement": "Weg", "force": "Kraft"},
     "units": {"time": "s", "displacement": "m", "force": "N"},
 }
 ZEIT = {"Zeit": TIME, "Weg": X, "Kraft": FORCE, "voltage_V": VOLTS}
+TIMELESS = {name: values for name, values in BASE.items() if name != "time_s"}
+VOLTLESS = {name: values for name, values in BASE.items() if name != "voltage_V"}
+SECONDS: dict[str, Any] = {"units": {"time": "s"}}
 LATE = np.concatenate((TIME, TIME + 64.0))
 TWICE = {"displacement_m": np.tile(X, 2), "force_N": np.tile(FORCE, 2), "voltage_V": np.tile(VOLTS, 2)}
 
@@ -251,6 +261,65 @@ WAYS: tuple[Way, ...] = (
         true={"temperature": -10.0},
     ),
     Way("an Excel file called .csv", text=lambda t: ["PK\x03\x04" + "xl/workbook"]),
+    Way("rate_Hz of 500 beside a clock of 1 kHz", entry={"rate_Hz": 500.0}),
+    Way("rate_Hz of 1000 beside a clock in milliseconds", {"t": TIME * 1e3, **TIMELESS}, {"rate_Hz": 1000.0}),
+    Way("rate_Hz beside a clock that the config leaves out", entry={"rate_Hz": 500.0, "columns": {"time": ""}}),
+    Way("rate_Hz beside numbers of samples", {"Time": np.arange(4000.0), **TIMELESS}, {"rate_Hz": 1000.0}),
+    Way("numbers of samples under time_s", other(time_s=np.arange(4000.0))),
+    Way("numbers of samples under time_s, seconds by the config", other(time_s=np.arange(4000.0)), SECONDS),
+    Way(
+        "every tenth sample, numbered under time_s",
+        {k: v[::10] for k, v in other(time_s=np.arange(4000.0)).items()},
+        true={"displacement": X[::10], "force": FORCE[::10]},
+    ),
+    Way("the clock jumps by a day", other(time_s=np.where(TIME < 2.0, TIME, TIME + 86400.0))),
+    Way(
+        "dates whose day comes first, read as months, over midnight",
+        {"when": days("%d/%m/%Y"), **TIMELESS},
+        {"columns": {"time": "when"}, "units": {"time": "%m/%d/%Y %H:%M:%S.%f"}},
+    ),
+    Way(
+        "dates whose month comes first, read as days, over midnight",
+        {"when": days("%m/%d/%Y"), **TIMELESS},
+        {"columns": {"time": "when"}, "units": {"time": "%d/%m/%Y %H:%M:%S.%f"}},
+    ),
+    Way(
+        "inches as a quotation mark",
+        renamed(displacement='Pos (")') | {'Pos (")': X / 0.0254},
+        {"columns": {"displacement": 'Pos (")'}},
+    ),
+    *(
+        Way(f"the header says {head}", renamed(force=head), {"columns": {"force": head}})
+        for head in ("Load [']", "Load (F0)", "Load [N/0]", "F [N*9**9**9]", "Load x10 [N]", "Load/100 [N]", "F [N N]")
+    ),
+    Way(
+        "the pattern cuts 1,5V to 5",
+        VOLTLESS,
+        {"path": "*.csv", "pattern": "(?P<voltage>[0-9.]+)V", "units": {"voltage": "V"}},
+        name="b_1,5V.csv",
+        true={"voltage": 1.5},
+    ),
+    Way(
+        "the pattern cuts 1.5V to 1",
+        VOLTLESS,
+        {"path": "*.csv", "pattern": "_(?P<voltage>[0-9]+)", "units": {"voltage": "V"}},
+        name="b_1.5V.csv",
+        true={"voltage": 1.5},
+    ),
+    Way(
+        "the pattern leaves out the minus of T-20C",
+        entry={"path": "*.csv", "pattern": "(?P<temperature>[0-9.]+)C", "units": {"temperature": "degC"}},
+        name="run_T-20C.csv",
+        true={"temperature": -20.0},
+    ),
+    Way("one cell of 6e198", other(force_N=spiked(FORCE, 1234, 6e198))),
+    Way("no headers", text=lambda t: t[1:]),
+    Way("no column of force", {k: v for k, v in BASE.items() if k != "force_N"}),
+    Way(
+        "one load and unload",
+        other(displacement_m=0.01 * np.sin(0.25 * np.pi * TIME), force_N=200.0 * np.cos(0.25 * np.pi * TIME)),
+    ),
+    Way("a hundred thousand brackets", text=lambda t: ["[" * 100_000], name="a.json"),
     Way("a JSON file", text=lambda t: [json.dumps({"time_s": TIME[:5].tolist()})]),
 )
 

@@ -15,7 +15,20 @@ from pzd.comfort import iso2631_1978, iso2631_1997
 from pzd.record import Array
 from pzd.report.blocks import amount, number, spelled
 from pzd.report.context import ReportContext
-from pzd.report.drawing import AXIS, BASELINE, FINAL, INK, MEASURED, Panel, Plot, axes, legend, line_of, thinned
+from pzd.report.drawing import (
+    AXIS,
+    BASELINE,
+    FINAL,
+    INK,
+    MEASURED,
+    Panel,
+    Plot,
+    axes,
+    legend,
+    line_of,
+    thinned,
+    ticks_named,
+)
 from pzd.simulate.policies import policies
 from pzd.simulate.roads.sine import Sine
 
@@ -94,7 +107,7 @@ def _scale_panel(context: ReportContext, road: str, known: list[tuple[SummaryRow
     for place, (row, value) in enumerate(known):
         colour, controlled = line_of(context, row)
         ax.plot(value, place, "s" if controlled else "o", color=colour, markersize=6.0, zorder=3)
-    ax.set_yticks(range(len(known)), names)
+    ticks_named(ax, names)
     ax.set_ylim(-0.6, len(known) + 2.6)
     ax.set_xlim(0.0, right)
     ax.grid(visible=False, axis="y")

@@ -18,9 +18,10 @@ from pzd.record import Array
 from pzd.rig.config import FileSplit, Fixture
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout, Values
 from pzd.rig.files.sheet import ReadingStep, Sheet
-from pzd.rig.files.units import UnitError, in_header, to_canonical
+from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import nearest
+from pzd.schema.yamltree import written
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -28,6 +29,7 @@ COMPRESSION = re.compile(r"compr|druckkraft|einfed|einschub", re.IGNORECASE)
 """Words in the header of a channel that counts compression positive."""
 OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities whose column may be wholly empty, which counts as absent."""
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 HALF_DAY = 43200.0
 """Twelve hours [s]."""
 _DATES = ("%d", "%j", "%x", "%c", "%D", "%F")
@@ -35,6 +37,9 @@ _DATES = ("%d", "%j", "%x", "%c", "%D", "%F")
 ROUNDING = 1e-9
 """A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant:
 conversion of units leaves some 1e-16, and no sensor resolves 1e-9."""
+
+LARGEST = 1e15
+"""Magnitude in SI above which a cell is no measurement: its square would still be a number, but of nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +87,7 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
     bad = [fault for source in found for fault in sheet.faults.get(source.column, [])]
     if bad:
         return Channels(_clock(sheet, layout, found), tuple(bad))
-    values = {source.spec.quantity: _instants(sheet, source) for source in found if source.dated}
+    values = {source.spec.quantity: instants(sheet, source.column, source.unit) for source in found if source.dated}
     if layout.entry.rate_Hz is not None:
         values |= _clock(sheet, layout, found)
     faults: list[str] = []
@@ -101,6 +106,12 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
             channel = source.spec.sign * to_canonical(cells, source.unit, source.spec.own)
         except UnitError as fault:
             raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
+        absurd = np.flatnonzero(np.abs(channel) > LARGEST)
+        if absurd.size:
+            more = f", and {absurd.size - 1} more such cells" if absurd.size > 1 else ""
+            place, head = sheet.place(int(absurd[0])), sheet.header[source.column]
+            faults.append(f"{place}: {head}: no {source.spec.own.name} is so large (got {cells[absurd[0]]:g}{more})")
+            continue
         values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
     if faults:
         return Channels(_clock(sheet, layout, found), tuple(faults))
@@ -188,20 +199,47 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
             data_faults.append(f"{sheet.top}: {spec.own.name}: duplicate column ({heads})")
         elif columns:
             unit = _unit(sheet, columns[0], spec)
-            if unit is None:
+            head = sheet.header[columns[0]]
+            factor = None if spec.unit or head in spec.canonical_headers else factor_in(head)
+            if factor is not None:
                 config_faults.append(
-                    f"{layout.place}.units: {spec.own.name}: the header {sheet.header[columns[0]]!r} of {sheet.path} "
+                    f"{layout.place}.units: {spec.own.name}: the header {head!r} of {sheet.path} names a factor, "
+                    f"{factor}; say what one recorded unit stands for, e.g. units: {{{spec.own.name}: 10 "
+                    f"{spec.own.unit}}}, or 0.1 {spec.own.unit}, or {spec.own.unit} where the numbers are right"
+                )
+            elif unit is None:
+                config_faults.append(
+                    f"{layout.place}.units: {spec.own.name}: the header {head!r} of {sheet.path} "
                     f"names no unit; say it, e.g. units: {{{spec.own.name}: {spec.own.unit}}}"
                 )
             else:
                 found.append(_Source(spec, columns[0], unit))
         elif spec.named or spec.quantity in NEEDED:
             data_faults.append(_missing(sheet, spec, layout.place))
+    if data_faults:
+        _refuse_no_header(sheet, layout)
     if config_faults:
         raise ConfigError(config_faults)
     if data_faults:
         raise DataError(data_faults)
     return found
+
+
+def _refuse_no_header(sheet: Sheet, layout: Layout) -> None:
+    """Refuse a sheet whose first line names no columns: it is one column to the separator, or holds numbers.
+
+    Raises
+    ------
+    DataError : with the key that reads it
+    """
+    got = f"(got {', '.join(sheet.header)})"
+    if len(sheet.header) == 1 and len(sheet.header[0].split()) >= len(NEEDED):
+        say = "the header is one column; if blanks stand between the fields, say separator: ' '"
+        raise DataError(f"{sheet.top}: {say} {got}")
+    if layout.entry.header is None and all(_NUMBER.fullmatch(head) for head in sheet.header if head):
+        shown = [*(quantity.column for quantity in NEEDED), *(f"column{n}" for n in range(4, len(sheet.header) + 1))]
+        say = f"name the columns in their order, e.g. header: [{', '.join(shown[: len(sheet.header)])}]"
+        raise DataError(f"{sheet.top}: numbers stand where the headers should; {say} {got}")
 
 
 def _unit(sheet: Sheet, column: int, spec: ChannelSpec) -> str | None:
@@ -217,11 +255,17 @@ def _unit(sheet: Sheet, column: int, spec: ChannelSpec) -> str | None:
 def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
     name, wanted = spec.own.name, spec.named or spec.own.column
     near = nearest(wanted, sheet.header) or next((h for h in sheet.header if name in h.lower()), None)
-    hint = f"; is it {near!r}? then say {place}.columns: {{{name}: {near}}}" if near else ""
+    if wanted.isdecimal() and 1 <= int(wanted) <= len(sheet.header):
+        near = sheet.header[int(wanted) - 1]
+    hint = f"; is it {near!r}? then say {place}.columns: {{{name}: {written(near)}}}" if near else ""
     if wanted in sheet.elsewhere:
         hint = (
             f"; it stands in table {sheet.elsewhere[wanted]!r}, which has another clock or length: export them as one"
         )
+    elif not hint and spec.quantity is TIME:
+        hint = "; where no column holds the time, say rate_Hz: N for N samples a second"
+    elif not hint and spec.quantity is FORCE:
+        hint = "; without force no damper: if another column holds it, say columns: {force: HEADER}"
     return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
 
 
@@ -232,28 +276,51 @@ def _clock(sheet: Sheet, layout: Layout, found: list[_Source]) -> dict[Quantity,
         begins = np.array(sheet.starts)[np.searchsorted(sheet.starts, rows, side="right") - 1]
         return {TIME: (rows - begins) / layout.entry.rate_Hz}
     (clock,) = (source for source in found if source.spec.quantity is TIME)
-    return {} if clock.dated or clock.column in sheet.faults else {TIME: sheet.numbers[clock.column]}
+    if clock.dated or clock.column in sheet.faults or (np.abs(sheet.numbers[clock.column]) > LARGEST).any():
+        return {}
+    return {TIME: sheet.numbers[clock.column]}
 
 
-def _instants(sheet: Sheet, source: _Source) -> Array:
-    """Convert dates and times to seconds since the first."""
+def day_and_month_exchanged(form: str) -> str:
+    """Return a format of dates with day and month the other way round."""
+    return re.sub("%[dm]", lambda code: {"%d": "%m", "%m": "%d"}[code[0]], form)
+
+
+def instants(sheet: Sheet, column: int, form: str) -> Array:
+    """Convert dates and times to seconds (rows,) since the first.
+
+    Parameters
+    ----------
+    sheet : the file
+    column : of the dates and times
+    form : their format
+
+    Raises
+    ------
+    DataError : when a cell has another format
+    """
     import pandas as pd
 
-    cells = sheet.texts[source.column]
-    instants = pd.to_datetime(pd.Series(cells), format=source.unit, errors="coerce")
-    bad = np.flatnonzero(instants.isna().to_numpy())
+    cells = sheet.texts[column]
+    found = pd.to_datetime(pd.Series(cells), format=form, errors="coerce")
+    bad = np.flatnonzero(found.isna().to_numpy())
     if bad.size:
         row = int(bad[0])
+        swapped = day_and_month_exchanged(form)
+        if swapped != form and not pd.to_datetime(pd.Series(cells), format=swapped, errors="coerce").isna().any():
+            raise DataError(
+                f"{sheet.place(row)}: {sheet.header[column]}: day and month are exchanged: say units: "
+                f"{{time: {written(swapped)}}} (got {cells[row]!r})"
+            )
         more = f" ({bad.size} such cells)" if bad.size > 1 else ""
         raise DataError(
-            f"{sheet.place(row)}: {sheet.header[source.column]}: "
-            f"no date and time like {source.unit}{more} (got {cells[row]!r})"
+            f"{sheet.place(row)}: {sheet.header[column]}: no date and time like {form}{more} (got {cells[row]!r})"
         )
-    seconds = np.asarray((instants - instants[0]).dt.total_seconds(), dtype=np.float64)
-    if any(code in source.unit for code in _DATES):
+    seconds = np.asarray((found - found[0]).dt.total_seconds(), dtype=np.float64)
+    if any(code in form for code in _DATES):
         return seconds
     # A clock without a date begins anew at midnight, one of twelve hours without am and pm at noon too.
-    turn = HALF_DAY if "%I" in source.unit and "%p" not in source.unit else 2.0 * HALF_DAY
+    turn = HALF_DAY if "%I" in form and "%p" not in form else 2.0 * HALF_DAY
     return seconds + turn * np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * turn)))
 
 

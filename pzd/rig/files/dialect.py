@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from pathlib import Path
 
 from pzd.schema.errors import DataError, FilesError, at
@@ -35,7 +36,8 @@ def text_of(path: Path, encoding: str) -> str:
         text = raw.decode("utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding)
     except UnicodeError as error:
         place = raw[: error.start].count(b"\n") + 1 if isinstance(error, UnicodeDecodeError) else None
-        raise DataError(f"{at(path, place)}: not {encoding} text; say its encoding, e.g. encoding: latin-1") from None
+        likely = "utf-16" if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "latin-1"
+        raise DataError(f"{at(path, place)}: not {encoding} text; say its encoding, e.g. encoding: {likely}") from None
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text:

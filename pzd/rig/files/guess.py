@@ -30,6 +30,7 @@ from pzd.rig.files.sniffing import (
     unit_of,
     value_in_names,
 )
+from pzd.rig.files.units import factor_in
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.measures import work
@@ -191,7 +192,7 @@ def _keys(
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        left = ", ".join(header for header in dialect.header if header.strip() and header not in columns.values())
+        left = ", ".join(_left(dialect.header, columns))
         counted = "; or say rate_Hz: N instead, where no column holds it"
         yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in missing)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
@@ -203,6 +204,13 @@ def _keys(
     yield from _events(files[0])
     if not missing and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
+
+
+def _left(header: Sequence[str], columns: dict[Quantity, str]) -> list[str]:
+    """Return the headers that may hold what is missing: of no quantity, else of one that a file may go without."""
+    filled = [head for head in header if head.strip()]
+    free = [head for head in filled if head not in columns.values()]
+    return free or [head for head in filled if head not in [columns.get(quantity) for quantity in NEEDED]]
 
 
 def _rate(file: SniffedFile) -> float | None:
@@ -251,7 +259,8 @@ def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
         if dated is not None:
             yield f"  time: '{dated}'"
         elif unit is None:
-            yield f"  {quantity.name}:   # fill in: {column} names no unit, e.g. {quantity.unit}"
+            lacks = "names a factor: what one recorded unit stands for" if factor_in(column) else "names no unit"
+            yield f"  {quantity.name}:   # fill in: {column} {lacks}, e.g. {quantity.unit}"
         elif not _read_alike(column, below, unit):
             yield f"  {quantity.name}: {written(unit)}"
 
@@ -388,8 +397,15 @@ def _control(files: Sequence[SniffedFile]) -> Control:
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
+    line = dialect.header_line if form == TEXT else None
+    lacking = [quantity.name for quantity in (DISPLACEMENT, FORCE) if quantity not in columns]
+    if columns and lacking and not _left(dialect.header, columns):
+        here = ", ".join(head for head in dialect.header if head.strip())
+        raise DataError(f"{at(path, line)}: without {' and '.join(lacking)} no damper: this file has {here}")
+    if not columns and all(re.fullmatch(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?|", head) for head in dialect.header):
+        names = "write a line of headers above them, e.g. time_s, displacement_m, force_N"
+        raise DataError(f"{at(path, line)}: numbers stand where the headers should; {names}")
     if not columns:
         shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
-        line = dialect.header_line if form == TEXT else None
         raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
     return SniffedFile(path, dialect, tuple(columns.items()), form)

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
 from pzd.rig.config import FilesEntry, NamedLayout
-from pzd.rig.files.sheet import Wanted
+from pzd.rig.files.sheet import LIKE_A_CLOCK, Wanted
 from pzd.rig.files.units import UnitError, constant
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import nearest
@@ -27,6 +27,8 @@ NEEDED = (TIME, DISPLACEMENT, FORCE)
 """Quantities that a file must have."""
 LABELS = (VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities that a constant or the name of the file may give."""
+_BEFORE_MINUS = re.compile(r"(?:^|[^A-Za-z0-9])(?:T|temp|temperature?|U|V|volt|voltage|I|current)?$", re.IGNORECASE)
+"""What stands before a minus; after any other word a dash joins."""
 ALSO_READ = {TEMPERATURE: "temperature_C"}
 """Second headers that are read without being named."""
 
@@ -75,6 +77,7 @@ class Layout:
             known=frozenset(known | set(self.entry.columns.values())),
             numbers=frozenset(h for spec in self.channels if not spec.dated for h in spec.headers),
             texts=frozenset(texts),
+            beside=None if self.entry.rate_Hz is None else LIKE_A_CLOCK,
             needed=tuple(frozenset(spec.headers) for spec in self.channels if spec.quantity in NEEDED),
         )
 
@@ -120,13 +123,22 @@ class Layout:
             places = f"{len(values)} places ({' and '.join(values)})"
             remedy = f"add what stands around the right one (got {path.name})"
             return [f"{self.place}.pattern: the file's name fits in {places}; {remedy}"]
-        starts = [found[0].start(group) for group in found[0].re.groupindex if group != "setting"]
-        left_out = [
-            at for at in starts if at > 0 and name[at - 1] == "-" and not name[max(at - 2, 0) : at - 1].isalnum()
-        ]
-        if not left_out:
-            return []
-        return [f"{self.place}.pattern: the minus in front of a number is left out; write -? (got {path.name})"]
+        spans = {group: found[0].span(group) for group in found[0].re.groupindex if group != "setting"}
+        faults = []
+        for group, (first, last) in spans.items():
+            whole = _whole_number(name, first, last)
+            if whole != name[first:last]:
+                take = f"let the group take all of it, e.g. (?P<{group}>-?[0-9.,x]+)"
+                faults.append(
+                    f"{self.place}.pattern: {group}: only {name[first:last]} of the number {whole} is taken; {take} "
+                    f"(got {path.name})"
+                )
+            elif minus_before(name, first) and f"-(?P<{group}>" not in (self.entry.pattern or ""):
+                faults.append(
+                    f"{self.place}.pattern: {group}: the minus in front of a number is left out; write -? in the "
+                    f"group, or -(?P<{group}>...) if it is a dash (got {path.name})"
+                )
+        return faults
 
     def _from_name(self, groups: dict[str, str | None], path: Path, faults: list[str]) -> Values:
         values: Values = {}
@@ -143,6 +155,20 @@ class Layout:
             at_place = f"{self.place}.pattern: {path.name}"
             values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
         return values
+
+
+def _whole_number(name: str, first: int, last: int) -> str:
+    """Return the number in a name of which a stretch is part, digits behind a decimal sign included."""
+    if first < 0 or not name[first:last].strip("-"):
+        return name[max(first, 0) : max(last, 0)]
+    before = re.search(r"(?:\d+[.,x]|\d+)?$", name[:first]) if name[first].isdigit() else None
+    after = re.match(r"\d*(?:[.,x]\d+)?", name[last:]) if name[last - 1].isdigit() else None
+    return (before[0] if before else "") + name[first:last] + (after[0] if after else "")
+
+
+def minus_before(name: str, first: int) -> bool:
+    """Whether a minus stands before a number: after a symbol, as in T-20C, or after what is no word, as in a_-20C."""
+    return first > 0 and name[first - 1] == "-" and bool(_BEFORE_MINUS.search(name[: first - 1]))
 
 
 def layouts(entries: Sequence[FilesEntry], control: Control, folder: Path) -> tuple[Layout, ...]:
@@ -216,7 +242,7 @@ def _faults(layout: Layout) -> list[str]:
         ways = [field for field in ways if field != "columns" or spec.headers]
         if spec.quantity in LABELS and len(ways) > 1:
             faults.append(f"{place}: {spec.own.name}: said twice, under {' and '.join(ways)}")
-    if entry.rate_Hz is not None:
+    if entry.rate_Hz is not None and entry.columns.get(TIME.name, " "):
         twice = [field for field in ("columns", "units", "sign") if TIME.name in getattr(entry, field)]
         faults += [f"{place}: time: said twice, under rate_Hz and {field}" for field in twice]
     if "setting" in groups and entry.setting is not None:

@@ -20,6 +20,8 @@ from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Fixture, Limits
 from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
 from pzd.rig.files.child import end_child
+from pzd.rig.files.clock import clock_remarks
+from pzd.rig.files.counted import beside_counted
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
@@ -298,11 +300,14 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]
     entry = layout.entry
     values, setting = layout.values(path)
     sheet = read_sheet(path, entry, layout.wanted(), layout.place)
+    by_rate = beside_counted(sheet, layout)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
     found = []
     bare = replace(sheet, numbers={}, texts={})  # the channels are made of them
-    for test in (on_regular_clock(replace(test, sheet=bare)) for test in tests):
+    for asked in tests:
+        remarks = (*asked.remarks, *by_rate, *clock_remarks(asked, layout))
+        test = on_regular_clock(replace(asked, sheet=bare, remarks=remarks))
         time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
         alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
         found.append((test, alone))

@@ -6,6 +6,7 @@ that holds a recording is read, the others are reported as left out.
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,6 +20,9 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.schema.errors import DataError, at
 
+LIKE_A_CLOCK = re.compile(r"^t(?![a-z0-9])|time|clock|zeit|\btemps\b|tiempo|^second|^sek", re.IGNORECASE)
+"""Headers of a column of time, whatever is in it."""
+
 
 @dataclass(frozen=True)
 class Wanted:
@@ -30,8 +34,14 @@ class Wanted:
     """Columns of numbers."""
     texts: frozenset[str] = frozenset()
     """Columns of texts: dates, labels, events."""
+    beside: re.Pattern[str] | None = None
+    """Further columns of numbers, by what their headers are like; cells that are none do no harm there."""
     needed: tuple[frozenset[str], ...] = ()
     """For each quantity that a recording must have, the headers that may hold it."""
+
+    def as_numbers(self, head: str) -> bool:
+        """Whether a column is to be read as numbers."""
+        return head in self.numbers or (self.beside is not None and self.beside.search(head) is not None)
 
 
 @dataclass(frozen=True)
@@ -364,7 +374,7 @@ def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> She
         pieces = [table.cells[table.header.index(head)] for table in tables if head in table.header]
         if head in wanted.texts or (dated and head in wanted.numbers):
             bare.texts[index] = [cell if isinstance(cell, str) else spelled(float(cell)) for p in pieces for cell in p]
-        elif head in wanted.numbers:
+        elif wanted.as_numbers(head):
             values, faults = _numbers(bare, head, pieces)
             bare.numbers[index] = values
             if faults:

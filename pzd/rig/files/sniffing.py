@@ -31,9 +31,9 @@ from pzd.quantities import (
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
-from pzd.rig.files.layout import ALSO_READ, own_quantity
+from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
 from pzd.rig.files.sheet import Wanted, spelled
-from pzd.rig.files.units import UnitError, in_header, to_canonical
+from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 
 # --- Quantity of a column, by its header in English, German, French or Spanish ---
@@ -111,6 +111,8 @@ def is_canonical(header: str, quantity: Quantity, control: Control) -> bool:
 
 def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
     """Return the unit in the row of units or the header, as pint spells it; None where it is of another quantity."""
+    if factor_in(header) is not None:
+        return None  # only a person knows which way it counts
     last = _LAST_WORD.search(header)
     text = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
     if not text:
@@ -181,7 +183,12 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
     if not all(matches) or len(units) != 1:
         return None
     (unit,) = units
-    return f"(?P<{name}>[0-9.x]+){unit}(?![A-Za-z])", {"C": "degC"}.get(unit, unit)
+    found = [(stem, match) for stem, match in zip(stems, matches, strict=True) if match]
+    minus = {minus_before(stem, match.start(1)) for stem, match in found if stem[: match.start(1)].endswith("-")}
+    if len(minus) > 1:
+        return None  # a dash in one name and a minus in another
+    comma = "," if any("," in match[1] for _, match in found) else ""
+    return f"(?P<{name}>{'-?' * (True in minus)}[0-9.{comma}x]+){unit}(?![A-Za-z])", {"C": "degC"}.get(unit, unit)
 
 
 def setting_in_names(stems: Sequence[str]) -> str | None:

@@ -1,6 +1,8 @@
-"""Conversion of the units in rig files and configs to SI and degC, by pint.
+"""Conversion of the units in rig files and configs to SI and degC.
 
-A quantity without a unit is an error elsewhere, never a guess.
+A unit is read by a grammar of its own: products, quotients and integer powers of names. pint is asked about single
+names alone and evaluates nothing, for a header may hold anything. A quantity without a unit is an error elsewhere,
+never a guess.
 """
 
 from __future__ import annotations
@@ -18,10 +20,33 @@ if TYPE_CHECKING:
     import pint
 
 
-_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+-].*?)\s*")
+_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+*/-].*?)\s*")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
-_LOGGERS = {"Sec": "s", "sec": "s", "Volts": "V", "Amps": "A", "lbs": "lbf", "kips": "kip", "deg_C": "degC"}
+_LOGGERS = {
+    "Sec": "s",
+    "sec": "s",
+    "Volts": "V",
+    "Amps": "A",
+    "lbs": "lbf",
+    "kips": "kip",
+    "deg_C": "degC",
+    **dict.fromkeys(('"', "''", "\u2033", "\u201d"), "inch"),
+    **dict.fromkeys(("'", "\u2032", "\u2019"), "foot"),
+}
 """Spellings of loggers that pint does not know, or takes for other units: the `lbs` of a rig are pounds of force."""
+LONGEST = 40
+"""Characters of the longest unit that is read."""
+MOST_FACTORS = 6
+"""Factors of a unit: kg m/s2 has three."""
+_SUPERSCRIPTS = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b", "0123456789-")
+_FACTOR_OF_UNIT = re.compile(r"(?P<name>\u00b0?[^\W\d_](?:[^\W\d_]|_(?=[^\W\d_]))*)(?:(?:\^|\*\*)?(?P<power>-?[1-9]))?")
+"""A name, and the digit of its power: `m`, `s2`, `s^-2`, `s**2`."""
+_BETWEEN_FACTORS = re.compile(r"\s*(?:(?P<over>/)|[*\u00b7\u22c5])\s*|\s+")
+_FACTOR_IN_HEADER = re.compile(
+    r"(?:(?<![^\W_])x|[\u00d7*/])\s?10+(?:[\^e][+-]?\d)?(?![^\W_]|\.\d)|(?<![\w.])10+\s?[x\u00d7*](?![^\W_])",
+    re.IGNORECASE,
+)
+"""A power of ten by which the numbers of a column were multiplied, or are to be: nobody else knows which."""
 
 
 class UnitError(ValueError):
@@ -56,12 +81,15 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
         return values
     sized = _NUMBER_AND_UNIT.fullmatch(unit)
     if sized:
-        return to_canonical(values * float(sized[1]), sized[2], quantity)
+        size = float(sized[1])
+        if not (np.isfinite(size) and size != 0.0):
+            raise UnitError(f"{quantity.name}: {unit!r} is no size of a unit; write one like '2.5 {quantity.unit}'")
+        return to_canonical(values * size, sized[2], quantity)
     import pint
 
     try:
-        converted = _registry().Quantity(values, _spelled(unit)).to(_spelled(quantity.unit))
-    except (pint.PintError, ValueError, AttributeError, TypeError) as error:
+        converted = _registry().Quantity(values, _parsed(unit)).to(_parsed(quantity.unit))
+    except (pint.PintError, ValueError, AttributeError, TypeError, KeyError, ArithmeticError) as error:
         raise UnitError(
             f"{quantity.name}: {unit!r} is no unit of it ({_one_line(error)}); write one like {quantity.unit!r}"
         ) from None
@@ -78,7 +106,10 @@ def constant(text: str, quantity: Quantity) -> float:
     parts = _NUMBER_AND_UNIT.fullmatch(text)
     if parts is None:
         raise UnitError(f"{quantity.name}: a number with its unit is needed, like '1.5 {quantity.unit}'")
-    return float(to_canonical(np.array([float(parts[1])]), parts[2], quantity)[0])
+    value = float(to_canonical(np.array([float(parts[1])]), parts[2], quantity)[0])
+    if not np.isfinite(value):
+        raise UnitError(f"{quantity.name}: a finite number is needed, like '1.5 {quantity.unit}'")
+    return value
 
 
 def in_header(header: str, quantity: Quantity) -> str | None:
@@ -92,6 +123,12 @@ def in_header(header: str, quantity: Quantity) -> str | None:
     return None
 
 
+def factor_in(header: str) -> str | None:
+    """Return the power of ten that a header names, as in `Load x10 [N]`; None without one."""
+    found = _FACTOR_IN_HEADER.search(header)
+    return found[0] if found else None
+
+
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[float]:
     import pint
@@ -99,9 +136,37 @@ def _registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry()
 
 
-def _spelled(unit: str) -> str:
-    """Spell a unit as pint reads it: m/s2 as m/s^2, and `Sec` as `s`."""
-    return re.sub(r"([A-Za-z])(\d)", r"\1^\2", _LOGGERS.get(unit, unit))
+def _parsed(unit: str) -> pint.util.UnitsContainer:
+    """Read a unit as powers of names, without evaluating: m/s2, kgf/cm^2, N s/m, 1/s.
+
+    Raises
+    ------
+    ValueError : when it is no product or quotient of names and their powers
+    """
+    text = _LOGGERS.get(unit, unit).translate(_SUPERSCRIPTS).strip()
+    if not text or len(text) > LONGEST:
+        raise ValueError(f"a unit has at most {LONGEST} characters" if text else "it is empty")
+    registry = _registry()
+    powers: pint.util.UnitsContainer = registry.UnitsContainer()
+    position, over, count = 0, False, 0
+    if text.startswith("1/"):
+        position, over = 2, True
+    while True:
+        factor = _FACTOR_OF_UNIT.match(text, position)
+        if factor is None or count == MOST_FACTORS:
+            raise ValueError("products, quotients and powers of unit names are read, as in N s/m or m/s2")
+        name, power = registry.get_name(_LOGGERS.get(factor["name"], factor["name"])), int(factor["power"] or 1)
+        powers *= registry.UnitsContainer({name: -power if over else power})
+        position, count = factor.end(), count + 1
+        if position == len(text):
+            return powers
+        between = _BETWEEN_FACTORS.match(text, position)
+        if between is None:
+            raise ValueError("products, quotients and powers of unit names are read, as in N s/m or m/s2")
+        # As in the field N/m s is taken for N/(m s) by some and N s/m by others: after a stroke a blank is no product.
+        if over and not between["over"]:
+            raise ValueError("what follows the stroke is unclear; write each divisor behind a stroke of its own")
+        over, position = bool(between["over"]), between.end()
 
 
 def _one_line(error: Exception) -> str:

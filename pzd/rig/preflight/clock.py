@@ -102,7 +102,7 @@ def jumps(test: PreflightRecord) -> Iterator[Finding]:
                 where=f"{name}, held or jumping {ends.size} times, the largest until {record.time[worst]:.6g} s",
                 size=float(steps[worst]),
                 unit=unit,
-                follows="the logger held this channel or lost samples; cut the record there, or measure it again",
+                follows="the logger held it or lost samples; take these rows out of the file or measure again",
             )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.artefacts import Finding
+from pzd.artefacts import Finding, RecordEntry
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.measures import reversals, rms
 from pzd.signals.period import moving_range
@@ -28,6 +28,35 @@ def cycle_count(test: PreflightRecord) -> Iterator[Finding]:
             follows=f"fewer than {ENOUGH_CYCLES:g}: noise and repeatability cannot be told from the damper; "
             "record 10 or more",
         )
+
+
+QUASI_STATIC = 1e-3
+"""R.m.s. speed [m/s] up to which a test is quasi-static: a damper of 2000 N s/m gives 2 N there."""
+
+
+def quasi_static(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """Find tests that are all so slow that they cannot show damping."""
+    speeds = [entry.velocity_rms_m_per_s or 0.0 for entry in entries]
+    if not entries or max(speeds) > QUASI_STATIC:
+        return entries
+    return tuple(
+        entry.model_copy(
+            update={
+                "findings": (
+                    *entry.findings,
+                    Finding(
+                        check="speed",
+                        where="the whole record, as every other of the rig, r.m.s. speed",
+                        size=speed,
+                        unit="m/s",
+                        follows="quasi-static: friction, gas force and springs show, the damping coefficient does not; "
+                        "drive faster tests as well",
+                    ),
+                )
+            }
+        )
+        for entry, speed in zip(entries, speeds, strict=True)
+    )
 
 
 # --- Limits of the stand, and rest before and after the motion ---
@@ -115,7 +144,7 @@ def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
         where=f"the whole record, {where}",
         size=gain if abs(gain - 1.0) > GAIN else rest,
         unit="-",
-        follows=f"{cause}; leave the column out to have it derived",
+        follows=f"{cause}; say columns: {{velocity: ''}} to have it derived",
     )
 
 
@@ -137,3 +166,4 @@ def steps(test: PreflightRecord) -> Iterator[Finding]:
 
 
 CHECKS = (cycle_count, reach, resolution, recorded_velocity, steps)
+COMPARISONS = (quasi_static,)

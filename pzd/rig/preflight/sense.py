@@ -22,7 +22,7 @@ def sign(test: PreflightRecord) -> Iterator[Finding]:
             where="the whole record",
             size=work(record.displacement, record.force),
             unit="J",
-            follows="a steady force over the net displacement outweighs the loops: take the tare out",
+            follows="a steady force over the net displacement outweighs the loops: say fixture: {tare_N: ...}",
         )
         return
     if test.cycles is None:
@@ -39,7 +39,7 @@ def sign(test: PreflightRecord) -> Iterator[Finding]:
             where=f"{negative.size} of {test.cycles.count} cycles, the first at {first:.4g} s",
             size=float(works.min()),
             unit="J",
-            follows="the damper does work on the rig there: check the cell, or leave these cycles out",
+            follows="the damper does work on the rig there: check the cell, or take these cycles out of the file",
         )
 
 

@@ -27,6 +27,8 @@ def holds(path: Path, start: bytes) -> bool:
         json.loads(path.read_bytes())
     except ValueError:
         return False
+    except RecursionError:
+        return True  # `tables` refuses it
     return True
 
 
@@ -36,6 +38,8 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
         read = json.loads(path.read_bytes(), parse_constant=_no_number, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise DataError(f"{at(path, error.lineno, error.colno)}: no JSON ({error.msg})") from None
+    except RecursionError:
+        raise DataError(f"{at(path, 1)}: lists and objects nested too deep for a table of a rig's channels") from None
     except _TwiceError as error:
         raise DataError(f"{at(path)}: the key {error.args[0]!r} stands twice in one object") from None
     if isinstance(read, list) and read and all(isinstance(row, dict) for row in read):

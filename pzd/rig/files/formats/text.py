@@ -41,6 +41,8 @@ _AT_A_TIME, _CHARACTERS = 4096, 65536
 """Lines and characters that are held at a time as strings of a line or a cell, which take many times the file."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
+_UNIT_CELL = re.compile(r"[\[(]?\s*[A-Za-z\u00b5\u00b0%][A-Za-z0-9\u00b5\u00b0%/*^ ]{0,12}[\])]?")
+"""A cell that may be a unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,10 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     table = _Table(path, tuple(header), body, numbers, lines.separator, entry.decimal)
     dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
     values, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
+    rest = (i for i in range(len(header)) if i not in (*dated, *values, *faults))
+    for column in [i for i in rest if wanted.as_numbers(header[i])]:
+        more, bad = table.numbers([column])
+        values, faults = values | more, faults | bad
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
     steps = tuple(_steps(entry, header, wanted, numbers))
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
@@ -320,6 +326,8 @@ class _Table:
                     bad.append(row)
             if bad:
                 advice = _advice([cells[row] for row in bad])
+                if bad == [0] and _UNIT_CELL.fullmatch(cells[0]):
+                    advice = "; if this row holds the units, say units_row: true"
                 wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad[:MOST_FAULTS]]
                 faults[column] = self._faults(column, wrong, len(bad))
             else:

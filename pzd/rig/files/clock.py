@@ -1,0 +1,182 @@
+"""Faults of a clock: standing still, two rates, a jump beyond the test, sample numbers or milliseconds as seconds.
+
+A clock that is misread makes another damper: its damping coefficient is wrong by the same factor.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from pzd.artefacts import Finding
+from pzd.quantities import DISPLACEMENT, TIME
+from pzd.record import Array, clock_fault
+from pzd.rig.files.channels import RawRecord, day_and_month_exchanged, instants
+from pzd.rig.files.layout import Layout
+from pzd.rig.files.sheet import Sheet
+from pzd.schema.errors import DataError
+from pzd.schema.yamltree import written
+from pzd.signals.measures import slope
+
+STRETCH = 20
+"""Steps of the clock in a block, whose median is one rate."""
+OTHER_RATE = 1.5
+"""Ratio above which two rates differ; lost samples and jitter stay below over a block."""
+SLOWEST_STEP = 0.05
+"""Step of the clock [s] from which it may be in milliseconds: stands take 20 samples a second and more,"""
+CREEPING = 5e-3
+"""where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
+OFTEN = 0.01
+"""Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
+LONGEST_PAUSE = 600.0
+"""Pause [s] that no test has, where it is longer than all the rest of the record as well."""
+MOST_LOST = 1_000_000
+"""Samples that would have to be thought into a pause; likewise."""
+_COUNTING = re.compile(
+    r"^(?:samples?|scans?|index|idx|nr|no|num|number|count(?:er)?|rows?|lines?|points?|n|i|#|messpunkte?|zeilen?)(?![a-z])",
+    re.IGNORECASE,
+)
+"""Headers of columns that count samples."""
+
+
+# --- Refusals ---
+
+
+def clock_faults(test: RawRecord, layout: Layout) -> list[str]:
+    """Describe what is wrong with the clock of a test that goes on without standing still."""
+    return _jump(test, layout) or _two_rates(test) or _sample_numbers(test, layout) or _milliseconds(test, layout)
+
+
+def standstills(test: RawRecord) -> list[str]:
+    """Describe where the clock stands still or goes back; NaN is reported as a bad cell."""
+    time = test.channels[TIME]
+    fault = clock_fault(time)
+    return [f"{test.place(fault[0])}: {fault[1]}{_rounded(time)}"] if fault else []
+
+
+def _rounded(time: Array) -> str:
+    """Return the remedy where a clock (n,) stands still often and never goes back: it has too few digits."""
+    steps = np.diff(time)
+    if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
+        return ""
+    rate = (time.size - 1) / (time[-1] - time[0])
+    return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
+
+
+def _jump(test: RawRecord, layout: Layout) -> list[str]:
+    """Describe a pause longer than all the rest of the record: dates exchanged, a clock that was set, two tests."""
+    time = test.channels[TIME]
+    steps = np.diff(time)
+    row = int(np.argmax(steps))
+    longest, usual = float(steps[row]), float(np.median(steps))
+    if longest <= float(time[-1] - time[0]) - longest or longest < min(LONGEST_PAUSE, MOST_LOST * usual):
+        return []
+    place = test.place(row + 1)
+    what = (
+        f"{place}: the clock jumps by {longest:.6g} s here, in a record of {time[-1] - time[0] - longest:.4g} s beside"
+    )
+    swapped = _days_first(test.sheet, layout, longest)
+    if swapped is not None:
+        return [f"{what}; day and month are exchanged: say units: {{time: {written(swapped)}}}"]
+    return [
+        f"{what}; for another test say split: {{gap_s: {_two_digits(0.5 * longest)}}}, else write a clock that goes on"
+    ]
+
+
+def _days_first(sheet: Sheet, layout: Layout, longest: float) -> str | None:
+    """Return the format with day and month exchanged, where by it the longest pause is a tenth at most."""
+    spec = next((spec for spec in layout.channels if spec.quantity is TIME and spec.dated), None)
+    column = next((i for i, head in enumerate(sheet.header) if spec and head in spec.headers), None)
+    if spec is None or spec.unit is None or column is None:
+        return None
+    swapped = day_and_month_exchanged(spec.unit)
+    try:
+        seconds = instants(sheet, column, swapped)
+    except DataError:
+        return None
+    steps = np.diff(seconds)
+    return swapped if steps.min() > 0.0 and steps.max() < 0.1 * longest else None
+
+
+def _two_rates(test: RawRecord) -> list[str]:
+    """Describe where the clock goes on at another rate: neither rate is the record's."""
+    time = test.channels[TIME]
+    steps = np.diff(time)
+    if steps.size < 2 * STRETCH:
+        return []
+    blocks = np.median(steps[: steps.size // STRETCH * STRETCH].reshape(-1, STRETCH), axis=1)
+    for row in np.flatnonzero(np.abs(np.log(blocks[1:] / blocks[:-1])) > np.log(OTHER_RATE)):
+        before, after = blocks[max(row - 1, 0) : row + 1], blocks[row + 1 : row + 4]
+        old, new = float(np.median(before)), float(np.median(after))
+        if after.size < 2 or max(old, new) < OTHER_RATE * min(old, new) or np.ptp(after[1:]) > 0.1 * new:
+            continue
+        near = slice(row * STRETCH, (row + 2) * STRETCH)
+        turn = int(np.argmax(np.abs(np.log(steps[near] / old)) > 0.5 * np.log(OTHER_RATE))) + near.start
+        rates = f"the clock goes on at {1.0 / new:.4g} Hz here, at {1.0 / old:.4g} Hz before"
+        return [f"{test.place(int(turn) + 1)}: {rates}; a record has one rate: {_cut_at(steps, int(turn))}"]
+    return []
+
+
+def _cut_at(steps: Array, turn: int) -> str:
+    """Return how to cut a clock with these steps (n,) at one of them: by a pause where one is there."""
+    others = float(np.max(np.delete(steps, turn)))
+    if steps[turn] > 2.0 * others:
+        return f"cut the file at this pause, split: {{gap_s: {_two_digits(np.sqrt(steps[turn] * others))}}}"
+    return "write the rows from here on into a file of their own"
+
+
+def _two_digits(seconds: float) -> str:
+    """Write seconds with two digits and without an exponent, as far as they can do without."""
+    return f"{float(f'{seconds:.2g}'):g}"
+
+
+def _sample_numbers(test: RawRecord, layout: Layout) -> list[str]:
+    """Describe a clock that counts samples: its header says so, or it counts 1, 2, 3 and the config gives no unit."""
+    spec = next((spec for spec in layout.channels if spec.quantity is TIME), None)
+    if spec is None or spec.dated or not _counts(test.channels[TIME]):
+        return []
+    head = next(head for head in test.sheet.header if head in spec.headers)
+    remedy = "say rate_Hz: N for N samples a second" + (
+        " in the place of columns and units of time" if spec.named else ""
+    )
+    if _COUNTING.match(head):
+        return [f"{test.place(0)}: time: column {head!r} counts samples, no seconds; {remedy}"]
+    if spec.unit is not None:
+        return []
+    ask = "the clock counts whole seconds, one a row; are these numbers of samples, or milliseconds?"
+    return [f"{test.place(0)}: {ask} {remedy}, or units: {{time: ms}}, or units: {{time: s}} if they are seconds"]
+
+
+def _counts(time: Array) -> bool:
+    """Whether a clock (n,) counts its rows: 0, 1, 2 or 1, 2, 3 and so on."""
+    return bool(np.all(np.diff(time) == 1.0) and time[0] == np.rint(time[0]))
+
+
+def _milliseconds(test: RawRecord, layout: Layout) -> list[str]:
+    """Describe a clock in steps of seconds beside a creeping motion, unless the config gives its unit or its rate."""
+    time, x = test.channels[TIME], test.channels[DISPLACEMENT]
+    given = layout.entry.rate_Hz is not None
+    given = given or any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
+    step, speed = float(np.median(np.diff(time))), float(np.abs(slope(time, x)).max())
+    if given or step < SLOWEST_STEP or speed > CREEPING:
+        return []
+    what = f"the clock goes in steps of {step:.4g} s while the motion reaches {1e3 * speed:.3g} mm/s"
+    remedy = "are these milliseconds? say units: {time: ms}, or units: {time: s} if they are seconds"
+    return [f"{test.place(0)}: {what}; {remedy}"]
+
+
+# --- Findings ---
+
+
+def clock_remarks(test: RawRecord, layout: Layout) -> Iterator[Finding]:
+    """Find a clock that counts whole seconds, one a row, which the config calls seconds."""
+    if layout.entry.rate_Hz is None and test.channels[TIME].size > 2 and _counts(test.channels[TIME]):
+        yield Finding(
+            check="clock",
+            where="time, one whole second a row",
+            size=1.0,
+            unit="s",
+            follows="numbers of samples look like this: the damping coefficient would be wrong by the sampling rate",
+        )

@@ -1,0 +1,121 @@
+"""Names: numbers in the names of files, and control signals that are called as something else is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from written_files import CANONICAL, FORCE, TIME, X, lines, run, write, wrong
+
+import pzd.artefacts  # noqa: F401  # declares the blocks whose keys are looked at
+from pzd.config import load
+from pzd.quantities import Control
+from pzd.rig.files.guess import guessed
+from pzd.rig.stage import ingest
+from pzd.schema.errors import ConfigError
+from pzd.schema.model import all_keys
+from pzd.schema.validate import canonical
+
+PLAIN = {"time_s": TIME, "displacement_m": X, "force_N": FORCE}
+
+# ---------------------------------------------------------------- numbers in the names of files
+
+NUMBERS: dict[str, tuple[str, float, dict[str, Any]]] = {
+    "b_1,5V": ("voltage", 1.5, {"units": {"voltage": "V"}}),
+    "b_1.5V": ("voltage", 1.5, {"units": {"voltage": "V"}}),
+    "b_0x5V": ("voltage", 0.5, {"units": {"voltage": "V"}}),
+    "sine_T-20C": ("temperature", -20.0, {"units": {"temperature": "degC"}}),
+    "sine_-20C": ("temperature", -20.0, {"units": {"temperature": "degC"}}),
+    "temp-7C_b": ("temperature", -7.0, {"units": {"temperature": "degC"}}),
+    "run-20C": ("temperature", 20.0, {"units": {"temperature": "degC"}}),
+}
+
+
+def read_by(folder: Path, pattern: str, more: dict[str, Any]) -> float | None:
+    (entry,) = run(folder, {"path": "*.csv", "pattern": pattern, **more}).entries
+    return entry.voltage_V if "voltage" in pattern else entry.temperature_degC
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, name: str) -> None:
+    quantity, value, _ = NUMBERS[name]
+    write(tmp_path / f"{name}.csv", lines(PLAIN))
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([tmp_path / f"{name}.csv"])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (entry,) = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert (entry.voltage_V if quantity == "voltage" else entry.temperature_degC) == value
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "remedy"),
+    [
+        ("b_1,5V", r"(?P<voltage>[0-9]+)V", r"(?P<voltage>-?[0-9.,x]+)V"),
+        ("b_1.5V", r"_(?P<voltage>[0-9]+)", r"_(?P<voltage>-?[0-9.,x]+)"),
+        ("b_15V", r"(?P<voltage>[0-9])V", r"(?P<voltage>-?[0-9.,x]+)V"),
+    ],
+)
+def test_a_number_that_a_pattern_cuts_is_refused(tmp_path: Path, name: str, pattern: str, remedy: str) -> None:
+    write(tmp_path / f"{name}.csv", lines(PLAIN))
+    more = {"units": {"voltage": "V"}}
+    (said,) = wrong(tmp_path, {"path": "*.csv", "pattern": pattern, **more})
+    assert "rig.files.0.pattern: voltage: only" in said
+    assert "(?P<voltage>-?[0-9.,x]+)" in said
+    assert read_by(tmp_path, remedy, more) == float(name[2:-1].replace(",", "."))
+
+
+def test_a_minus_behind_a_symbol_is_refused_until_the_pattern_says_what_it_is(tmp_path: Path) -> None:
+    write(tmp_path / "sine_T-20C.csv", lines(PLAIN))
+    more = {"units": {"temperature": "degC"}}
+    (said,) = wrong(tmp_path, {"path": "*.csv", "pattern": "(?P<temperature>[0-9]+)C", **more})
+    assert "temperature: the minus in front of a number is left out" in said
+    assert read_by(tmp_path, "(?P<temperature>-?[0-9]+)C", more) == -20.0
+    assert read_by(tmp_path, "T-(?P<temperature>[0-9]+)C", more) == 20.0
+
+
+# ---------------------------------------------------------------- the name of the control signal
+
+
+@pytest.mark.parametrize("name", ["u", "i", "v", "s", "U", "I"])
+def test_a_control_of_one_letter_is_no_part_of_other_keys(tmp_path: Path, name: str) -> None:
+    """Called u, it turned `unit` and `units` into no such key; called s, `sign`, and `gap_s` would be a voltage."""
+    write(tmp_path / "a.csv", lines({**PLAIN, "signal": np.full(TIME.size, 2.0)}))
+    text = f"""
+control: {{name: {name}, unit: A}}
+rig:
+  files:
+    - path: a.csv
+      columns: {{{name}: signal}}
+      units: {{{name}: A}}
+      sign: {{{name}: -1}}
+      split: {{gap_s: 3}}
+  limits: {{{name}_A: [0, 3]}}
+"""
+    (tmp_path / "c.yaml").write_text(text, encoding="utf-8")
+    config = load(tmp_path / "c.yaml")
+    (entry,) = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert entry.voltage_V == -2.0
+    assert config.rig.limits.voltage_V == (0.0, 3.0)
+
+
+@pytest.mark.parametrize("name", ["u", "i", "v", "s", "current", "rebound_clicks"])
+def test_keys_go_to_the_name_of_a_control_and_back(name: str) -> None:
+    control = Control(name, "A")
+    for key in all_keys():
+        assert canonical(control.renamed(key), control) == key
+        assert "voltage" in key or canonical(key, control) == key
+
+
+@pytest.mark.parametrize("name", ["k", "T0", "C", "n", "F", "unit", "units", "sign", "setting", "gas_spring"])
+def test_a_control_called_as_a_key_or_a_parameter_is_refused(tmp_path: Path, name: str) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL))
+    rest = "rig:\n  files:\n    - path: a.csv\n      columns: {voltage: voltage_V}\n      units: {voltage: A}\n"
+    (tmp_path / "c.yaml").write_text(f"control: {{name: {name}, unit: A}}\n{rest}", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "c.yaml")
+    (said,) = caught.value.messages
+    assert f"c.yaml:1:17: control.name: {name} is a key or a parameter of pzd" in said
+    proposed = said.partition("e.g. ")[2].partition(" ")[0]
+    (tmp_path / "c.yaml").write_text(f"control: {{name: {proposed}, unit: A}}\n{rest}", encoding="utf-8")
+    assert load(tmp_path / "c.yaml").control.name == proposed
