@@ -10,11 +10,12 @@ from __future__ import annotations
 import hashlib
 import os
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
+
+from pzd.parallel.processes import own_python
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -66,5 +67,5 @@ def wait() -> None:
 
 def _compile() -> None:
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", "pzd.simulate.precompile"]
+    command = own_python("from runpy import run_module; run_module('pzd.simulate.precompile', run_name='__main__')")
     subprocess.run(command, stdin=quiet, stdout=quiet, stderr=quiet, check=False)  # noqa: S603  # our own module

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from pzd.parallel.processes import parallel_map
+import pzd.record
+from pzd.parallel.processes import own_python, parallel_map
 from pzd.schema.errors import DataError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -92,3 +93,13 @@ def test_what_was_killed_there_is_made_here() -> None:
         return number
 
     assert parallel_map(killed_elsewhere, range(5), 3) == list(range(5))
+
+
+def test_a_process_of_our_own_takes_no_module_from_the_folder_where_somebody_stands(tmp_path: Path) -> None:
+    for name in ("pzd", "numpy", "json"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('planted')\n", encoding="utf-8")
+    command = own_python("import json, numpy, pzd.record; print(pzd.record.__file__)")
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.strip() == pzd.record.__file__

@@ -13,7 +13,6 @@ import pickle
 import re
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -24,6 +23,7 @@ from threading import Lock, Timer
 from types import ModuleType, SimpleNamespace
 from typing import IO, Any, cast
 
+from pzd.parallel.processes import own_python
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 _MEGABYTE, _GIGABYTE = 1e6, 1e9
@@ -33,13 +33,6 @@ _PATIENCE, _PATIENCE_A_SECOND = 60.0, 2.0
 """Time on the clock [s], and more by the computing time, until a child is ended that waits, or computes unlimited."""
 _MEMORY, _MEMORY_A_BYTE = 1e9, 50.0
 """Memory that reading a file may take, and more by its size [bytes]: a cell of a workbook takes some 100 bytes."""
-_START = """
-import sys
-if {root!r} not in sys.path:
-    sys.path.insert(0, {root!r})
-from pzd.rig.files.child import serve
-serve()
-"""
 _ADVICE = "export it again, or save its columns as CSV"
 _ERRORS: dict[str, type[UserError]] = {kind.__name__: kind for kind in (ConfigError, DataError, FilesError)}
 
@@ -53,10 +46,8 @@ class _Child:
     def __init__(self) -> None:
         self.owner = os.getpid()
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed by `end`
-        root = str(Path(__file__).resolve().parents[3])
-        # -P: a `numpy.py` in the folder where somebody stands is not the library
         self._process = subprocess.Popen(  # noqa: S603  # our own module
-            [sys.executable, "-P", "-c", _START.format(root=root)],
+            own_python("from pzd.rig.files.child import serve; serve()"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,

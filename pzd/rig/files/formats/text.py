@@ -12,7 +12,7 @@ import re
 from array import array
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -270,10 +270,10 @@ class _Table:
     def numbers(self, columns: list[int]) -> tuple[dict[int, Array], dict[int, list[str]]]:
         """Parse columns (rows,) of numbers, an empty cell NaN; those with other cells come back as faults."""
         try:
-            frame = self._parsed(columns, "float64")
+            (frame,) = self._parsed(columns, "float64", self.lines.size)
         except (ValueError, OverflowError):
-            again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
-            if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns):
+            again = [row for row, cell in enumerate(self._cells(columns[0])) if cell == self.header[columns[0]]]
+            if all(next(islice(self._cells(c), row, None)) == self.header[c] for row in again[:1] for c in columns):
                 _refuse_repeated_header(self.path, self.lines, again)
             return self._cell_by_cell(columns)
         values = {column: frame[column].to_numpy() for column in columns}
@@ -288,14 +288,20 @@ class _Table:
 
     def texts(self, column: int) -> list[str]:
         """Return the cells of one column, stripped; empty where a line ends before it."""
-        cells = self._parsed([column], "str")[column].fillna("").tolist()
-        separator = "," if self.separator == _UNQUOTED else self.separator
-        return [cell.replace(_EVENT_SEPARATOR, separator).strip() for cell in cells]
+        return list(self._cells(column))
 
-    def _parsed(self, columns: list[int], kind: str) -> pd.DataFrame:
+    def _cells(self, column: int) -> Iterator[str]:
+        """Yield the cells of one column as `texts` has them, a few at a time in memory."""
+        separator = "," if self.separator == _UNQUOTED else self.separator
+        for block in self._parsed([column], "str", _AT_A_TIME):
+            for cell in block[column].fillna("").tolist():
+                yield cell.replace(_EVENT_SEPARATOR, separator).strip()
+
+    def _parsed(self, columns: list[int], kind: str, rows: int) -> Iterator[pd.DataFrame]:
+        """Yield columns, so many rows at a time."""
         import pandas as pd
 
-        return pd.read_csv(
+        yield from pd.read_csv(
             io.BytesIO(self.body.encode()),  # a StringIO takes four bytes for each character
             sep=r"\s+" if self.separator == BLANKS else self.separator,
             decimal=self.decimal,
@@ -309,6 +315,7 @@ class _Table:
             skipinitialspace=True,
             quoting=csv.QUOTE_NONE,
             engine="c",
+            chunksize=rows,
         )
 
     def _cell_by_cell(self, columns: list[int]) -> tuple[dict[int, Array], dict[int, list[str]]]:
@@ -316,20 +323,22 @@ class _Table:
         found: dict[int, Array] = {}
         faults: dict[int, list[str]] = {}
         for column in columns:
-            cells = self.texts(column)
-            values = np.full(len(cells), np.nan)
-            bad: list[int] = []
-            for row, cell in enumerate(cells):
+            values = np.full(self.lines.size, np.nan)
+            first: list[tuple[int, str]] = []
+            bad, grouped, commas = 0, False, False
+            for row, cell in enumerate(self._cells(column)):
                 try:
                     values[row] = _number(cell, self.decimal)
                 except ValueError:
-                    bad.append(row)
+                    bad += 1
+                    first += [(row, cell)] if bad <= MOST_FAULTS else []
+                    grouped, commas = grouped or _GROUPED.fullmatch(cell) is not None, commas or "," in cell
             if bad:
-                advice = _advice([cells[row] for row in bad])
-                if bad == [0] and _UNIT_CELL.fullmatch(cells[0]):
+                advice = _advice(grouped=grouped, commas=commas)
+                if bad == 1 and first[0][0] == 0 and _UNIT_CELL.fullmatch(first[0][1]):
                     advice = "; if this row holds the units, say units_row: true"
-                wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad[:MOST_FAULTS]]
-                faults[column] = self._faults(column, wrong, len(bad))
+                wrong = [(row, f"a number is needed (got {cell!r}){advice}") for row, cell in first]
+                faults[column] = self._faults(column, wrong, bad)
             else:
                 found[column] = values
         return found, faults
@@ -352,8 +361,8 @@ def _number(cell: str, decimal: str) -> float:
     return value
 
 
-def _advice(cells: Sequence[str]) -> str:
-    """Return what to do about cells that are no numbers, where they tell it by themselves."""
-    if any(_GROUPED.fullmatch(cell) for cell in cells):
+def _advice(*, grouped: bool, commas: bool) -> str:
+    """Return what to do about cells that are no numbers, where some are grouped by thousands or have commas."""
+    if grouped:
         return "; write the file without grouping thousands"
-    return "; for decimal commas say decimal: ','" if any("," in cell for cell in cells) else ""
+    return "; for decimal commas say decimal: ','" if commas else ""
