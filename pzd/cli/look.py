@@ -71,7 +71,7 @@ def check(call: Call, plot: PlotFile = None) -> int:
     _check_plot(plot)
     rig = preflight(given)
     if plot is not None:
-        from pzd.report.recorded import records_page
+        from pzd.report.page import records_page
 
         plot.write_text(records_page(rig, given.run.control, CORES), encoding="utf-8", newline="\n")
     if output.as_json:

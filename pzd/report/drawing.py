@@ -141,7 +141,7 @@ def shortened(label: str) -> str:
     Examples
     --------
     >>> shortened("damper_12_after_endurance_run_sine_2Hz_150V")
-    'damper_12_aft…_sine_2Hz_150V'
+    'damper_12_after_…run_sine_2Hz_150V'
     """
     if len(label) <= _LONGEST_LABEL:
         return label

@@ -116,7 +116,9 @@ def test_warm_up_rows_are_written_and_read_back_and_an_earlier_run_has_none(tmp_
 
 def test_the_terminal_shows_the_warm_up() -> None:
     found = Characteristics(warm_up=tuple(row(n, 100.0 * n, warmth=20.0 + n) for n in range(1, 8)))
-    assert tables.warm_up(found, Control()).lines() == [
+    (table,) = [one for one in tables.characteristics(found, Control()) if one.rows]
+    assert table.title.startswith("Warm-up")
+    assert table.lines() == [
         "speed [m/s]  cycles  temperature [degC]  rebound [N]  compression [N]  record",
         "0.1          7       22 to 26            200 to 600   -200 to -600     r",
     ]

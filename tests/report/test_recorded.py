@@ -14,7 +14,7 @@ import pytest
 
 from pzd.artefacts import Finding, Rig
 from pzd.quantities import Control
-from pzd.report.recorded import envelope, records_page, times_of
+from pzd.report.page import envelope, records_page, times_of
 
 
 def finding(where: str) -> Finding:

@@ -200,9 +200,10 @@ def recorder(
 
     Parameters
     ----------
-    entry, seed, law : as for `run_campaign`
+    entry, seed : as for `run_campaign`
     folder : of the config, for motions that are read; the record raises ConfigError where the file of one is missing,
         and DataError where it cannot be read
+    law : as for `run_campaign`
     """
     last: _Drive | None = None
 
