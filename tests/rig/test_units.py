@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from time import monotonic
 
@@ -9,10 +10,12 @@ import numpy as np
 import pytest
 from written_files import FORCE, TIME, X, lines, run, write, wrong
 
+from pzd.config import load
 from pzd.quantities import ACCELERATION, DISPLACEMENT, PRESSURE, TEMPERATURE, VELOCITY, Quantity
 from pzd.quantities import FORCE as LOAD
 from pzd.rig.files.guess import guessed
 from pzd.rig.files.units import UnitError, constant, to_canonical
+from pzd.rig.stage import ingest
 
 READ = [
     ("mm", DISPLACEMENT, 1e-3),
@@ -30,6 +33,7 @@ READ = [
     ("kgf/cm2", PRESSURE, 98066.5),
     ("lbf/in**2", PRESSURE, 6894.757),
     ("1/s m", VELOCITY, None),
+    ("cm/s^1.75", Quantity("VDV", "VDV", "m/s^1.75", "vibration dose value"), 0.01),
 ]
 
 
@@ -107,3 +111,14 @@ def test_a_factor_in_a_header_counts_as_the_config_says(tmp_path: Path, unit: st
     write(tmp_path / "a.csv", lines({"time_s": TIME, "displacement_m": X, "Load x10 [N]": FORCE / one}))
     entry = {"path": "a.csv", "columns": {"force": "Load x10 [N]"}, "units": {"force": unit}}
     assert np.abs(run(tmp_path, entry).records[0].force - FORCE).max() < 1e-5
+
+
+@pytest.mark.parametrize("head", ['Pos "', 'Pos (")', '"Pos ("")"', '"Pos [in]"'])
+def test_inches_in_quotes_or_as_a_quote_are_guessed_and_read_back(tmp_path: Path, head: str) -> None:
+    write(tmp_path / "a.csv", lines({"Time [s]": TIME, head: X / 0.0254, "Load [N]": FORCE}))
+    text = "\n".join(guessed([tmp_path / "a.csv"]))
+    text = re.sub(r"(displacement:)   # fill in: .*", r"\1 in", text)
+    (tmp_path / "guess.yaml").write_text(text, encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
+    assert np.abs(record.displacement - X).max() < 1e-9

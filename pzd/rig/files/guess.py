@@ -313,6 +313,8 @@ def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
         sheet = read_sheet(file.path, _as_sniffed(file), Wanted(heads, numbers=heads, needed=needed), "rig.files")
     except DataError:
         return False
+    if not heads <= set(sheet.header):
+        return False
     places = (sheet.header.index(columns[quantity]) for quantity in (DISPLACEMENT, FORCE))
     x, force = (sheet.numbers.get(place, np.empty(0)) for place in places)
     known = x.size == force.size > 2 and bool(np.isfinite(x).all() and np.isfinite(force).all())

@@ -308,7 +308,7 @@ def _table(
     cells: list[list[str]], encoding: str, separator: str, decimal: str
 ) -> tuple[tuple[int, int], Dialect] | None:
     """Find the table in rows read this way, rated by its rows and then the numbers in them."""
-    rows = [[cell.strip('"') for cell in row] for row in cells]
+    rows = [[_unquoted(cell) for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
     data = [n for n, row in enumerate(rows) if len(row) > 1 and 2 * numbers[n] >= len(row) and numbers[n]]
     # A line of the preamble, say one of a date, may hold numbers too, but it is narrower than the table.
@@ -332,6 +332,12 @@ def _table(
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
     return (len(alike), sum(numbers[n] for n in alike[:1])), found
+
+
+def _unquoted(cell: str) -> str:
+    """Return a cell without the quotes around it, as the reader does; a single one may mean inches."""
+    around = len(cell) > 1 and cell[0] == cell[-1] == '"'
+    return cell[1:-1].replace('""', '"').strip() if around else cell
 
 
 def _numbers(row: list[str], decimal: str) -> int:

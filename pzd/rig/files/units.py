@@ -39,8 +39,11 @@ LONGEST = 40
 MOST_FACTORS = 6
 """Factors of a unit: kg m/s2 has three."""
 _SUPERSCRIPTS = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b", "0123456789-")
-_FACTOR_OF_UNIT = re.compile(r"(?P<name>\u00b0?[^\W\d_](?:[^\W\d_]|_(?=[^\W\d_]))*)(?:(?:\^|\*\*)?(?P<power>-?[1-9]))?")
-"""A name, and the digit of its power: `m`, `s2`, `s^-2`, `s**2`."""
+_FACTOR_OF_UNIT = re.compile(
+    r"(?P<name>%|\u00b0?[^\W\d_](?:[^\W\d_]|_(?=[^\W\d_]))*)"
+    r"(?:\^(?P<broken>[1-9]\.\d{1,2})|(?:\^|\*\*)?(?P<power>-?[1-9]))?"
+)
+"""A name, and the digit of its power: `m`, `s2`, `s^-2`, `s**2`; a broken power stands in m/s^1.75 of a dose alone."""
 _BETWEEN_FACTORS = re.compile(r"\s*(?:(?P<over>/)|[*\u00b7\u22c5])\s*|\s+")
 _FACTOR_IN_HEADER = re.compile(
     r"(?:(?<![^\W_])x|[\u00d7*/])\s?10+(?:[\^e][+-]?\d)?(?![^\W_]|\.\d)|(?<![\w.])10+\s?[x\u00d7*](?![^\W_])",
@@ -155,7 +158,8 @@ def _parsed(unit: str) -> pint.util.UnitsContainer:
         factor = _FACTOR_OF_UNIT.match(text, position)
         if factor is None or count == MOST_FACTORS:
             raise ValueError("products, quotients and powers of unit names are read, as in N s/m or m/s2")
-        name, power = registry.get_name(_LOGGERS.get(factor["name"], factor["name"])), int(factor["power"] or 1)
+        name = registry.get_name(_LOGGERS.get(factor["name"], factor["name"]))
+        power = float(factor["broken"]) if factor["broken"] else int(factor["power"] or 1)
         powers *= registry.UnitsContainer({name: -power if over else power})
         position, count = factor.end(), count + 1
         if position == len(text):
