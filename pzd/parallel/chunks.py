@@ -97,7 +97,7 @@ class ChunkedWork(Generic[T, R]):
                     except _LostError as error:
                         tries += 1
                         if tries == TRIES:
-                            reason = f"the process that did it was lost {TRIES} times: {error}"
+                            reason = f"the process that did it was lost {tries} times: {error}"
                             found.append(self.lost(task, error.step, reason))
                             tries = 0
                         break  # out of processes that may be gone, into new ones
