@@ -75,6 +75,10 @@ bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that 
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identification $(BIN)/python tests/studies/coverage_study.py
 
+.PHONY: nist
+nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of NIST StRD; a second
+	PYTHONPATH=.:tests/fit $(BIN)/python tests/studies/nist.py
+
 .PHONY: sensitivity
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py

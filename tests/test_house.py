@@ -29,6 +29,7 @@ ORDER = (
     "compiled",
     "signals",
     "damper",
+    "fit",
     "artefacts",
     "rig",
     "identification",
