@@ -14,6 +14,7 @@ from pzd.diagnosis.cross_validation import Folds, PredictionError, assign_folds,
 from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
 from pzd.diagnosis.fit.prediction import comparable_samples
 from pzd.diagnosis.peers import Peer, PeerForm, ShapeParameter, StrokeMotion, peers
+from pzd.fit.least_squares import minimise, minimise_from
 from pzd.record import Array, Mask
 from pzd.schema.errors import ConfigError, DataError
 
@@ -24,6 +25,8 @@ DESCENTS = 3
 """Best points of the grid from which a local search starts.
 
 Reason: time; the residual has few minima over the shape."""
+RESOLUTION = 1e-6
+"""Residual that says nothing of a shape, as a share of the force (r.m.s.): far below what any sensor shows."""
 AT_LIMIT = 1e-3
 """Share of the search range within which a shape parameter counts as at its limit; not tuned."""
 
@@ -63,8 +66,6 @@ def fit_peer(peer: Peer, form: PeerForm, tests: Sequence[PeerData]) -> PeerFit:
     peer, form : model to fit
     tests : at one voltage, one or more
     """
-    from scipy.optimize import least_squares
-
     force = np.concatenate([test.force[test.fitted] for test in tests])
     scale = float(np.linalg.norm(force))
 
@@ -80,13 +81,15 @@ def fit_peer(peer: Peer, form: PeerForm, tests: Sequence[PeerData]) -> PeerFit:
     starts.sort(key=lambda start: float(np.sum(residual_of(start) ** 2)))
     low = _searched(peer, np.array([p.low for p in peer.shape]))
     high = _searched(peer, np.array([p.high for p in peer.shape]))
-    found = [least_squares(residual_of, start, bounds=(low, high), x_scale="jac") for start in starts[:DESCENTS]]
-    best = min(found, key=lambda one: float(one.cost))
+    resolution = RESOLUTION / np.sqrt(force.size)
+    best = minimise_from(
+        starts[:DESCENTS], lambda start: minimise(residual_of, start, bounds=(low, high), resolution=resolution)
+    )
     shape = _shape(peer, best.x)
     coefficients, residual = solved(shape)
     inside = np.minimum(best.x - low, high - best.x) > AT_LIMIT * (high - low)
     limited = [p.name for p, free in zip(peer.shape, inside, strict=True) if not free]
-    status = f"at its limit: {', '.join(limited)}" if limited else "converged" if best.status > 0 else "not converged"
+    status = f"at its limit: {', '.join(limited)}" if limited else "converged" if best.converged else "not converged"
     return PeerFit(np.concatenate([coefficients, shape]), float(residual @ residual) * scale**2, status)
 
 

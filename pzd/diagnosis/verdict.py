@@ -22,6 +22,7 @@ from pzd.diagnosis.campaign import Campaign, nearest_row
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.data import TRAINING, PreparedRecord
+from pzd.diagnosis.fit.least_squares import polished
 from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples
 from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
@@ -59,7 +60,7 @@ def conclude(
     config : thresholds, forced and forbidden effects
     unit : of the control signal, for the reason
     """
-    adoption = adopt_effects(selection, validation, config.force, unit)
+    adoption = _polished(adopt_effects(selection, validation, config.force, unit))
     if adoption.rejection:
         decision = Decision("unexplained", adoption.rejection, None)
     else:
@@ -69,12 +70,21 @@ def conclude(
         if trend is not None:
             decision = Decision("unexplained", f"{decision.reason}; but {trend}", None)
     if decision.verdict == "unexplained":
-        adoption = add_predictive_effects(adoption, validation, config)
+        adoption = _polished(add_predictive_effects(adoption, validation, config))
         if added := adoption.added:
             stands = "it stands" if len(added) == 1 else "they stand"
             words = f"kept-back tests are predicted better with {' and '.join(added)}, whatever {stands} for"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
     return adoption, decision
+
+
+def _polished(adoption: Adoption) -> Adoption:
+    """Search the fit of what is adopted on to its optimum, so that its figures can be quoted."""
+    selection = adoption.selection
+    if not selection.adopted:
+        return adoption
+    fitted = polished(selection.final_evidence.whole, selection.fitted)
+    return replace(adoption, selection=replace(selection, fitted=fitted))
 
 
 # --- Verdict from what is left of the gap

@@ -216,6 +216,8 @@ DOUBTS: dict[Verdict, str] = {
     "ambiguous": "a rival effect would leave other values",
 }
 """Why no row is `ok` under a verdict."""
+NOT_CONVERGED = "the least squares have not converged"
+"""Why no row is `ok` whose fit ended before its optimum."""
 SHOWN = 1.0
 """Share of the force that a parameter moves, for its status: what the tests do not show has a wide interval here."""
 
@@ -235,6 +237,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
     fitted, whole = selection.fitted, selection.final_evidence.whole
     compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
     rows = []
+    doubt = DOUBTS.get(verdict) if fitted.converged else NOT_CONVERGED
     half_widths = base_half_widths(fitted, whole.scales.force)
     for place, (row, widths) in enumerate(zip(fitted.damper.base, half_widths, strict=True)):
         mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
@@ -243,7 +246,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
         scales = parameter_scales(parameters, measured).tolist()
         evidence = [
-            ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
+            ParameterEvidence(name, scale, width, width, SHOWN, doubt=doubt)
             for name, scale, width in zip(PARAMETER_NAMES, scales, widths.tolist(), strict=True)
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)

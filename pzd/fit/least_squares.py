@@ -35,6 +35,8 @@ Reason: rounding in the residuals (1e-16) moves the variables by this factor; be
 NIST StRD goes to 1e8."""
 ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 """Rounding of a residual, as a share of what its variables contribute to it: the root of a thousand operations."""
+BY_CHANCE = 3.0
+"""Multiple of the resolution that residuals may have along the columns of the Jacobian: three standard deviations."""
 AT_LIMIT = 1e-2
 """Distance from a limit within which a variable lies at it [standard errors of that variable alone].
 
@@ -92,6 +94,7 @@ def minimise(
     precision: float = PRECISION,
     evaluations: int = MOST_EVALUATIONS,
     largest_offset: float = LARGEST_OFFSET,
+    resolution: float = 0.0,
     size: int | None = None,
 ) -> Optimum:
     """Minimise a sum of squares from a starting point within limits, and judge what was found.
@@ -108,6 +111,7 @@ def minimise(
     precision : relative change at which the search ends
     evaluations : of the residuals, at most
     largest_offset : of an optimum that counts as converged
+    resolution : size of a residual up to which the model is computed at random; an exact fit leaves no more
     size : number of residuals, where n rows with the same inner products stand for more
 
     Raises
@@ -119,7 +123,8 @@ def minimise(
     low, high = bounds if bounds is not None else (np.full(start.size, -np.inf), np.full(start.size, np.inf))
     if start.size == 0:
         left = np.asarray(residuals(start), dtype=np.float64)
-        return _judged(start, left, np.zeros((left.size, 0)), (low, high), largest_offset, size or left.size, 1)
+        limits = _Limits(low, high, largest_offset, resolution, size or left.size)
+        return _judged(start, left, np.zeros((left.size, 0)), limits, 1)
     slopes: Any = jacobian or "3-point"
     found = least_squares(
         residuals,
@@ -132,22 +137,19 @@ def minimise(
         gtol=precision,
         max_nfev=evaluations,
     )
-    rows = found.fun.size if size is None else size
-
-    def judged(x: Array, values: Array, derivatives: Array, taken: int) -> Optimum:
-        return _judged(x, values, derivatives, (low, high), largest_offset, rows, int(found.nfev) + taken)
-
-    best = judged(found.x, found.fun, np.asarray(found.jac), 0)
+    limits = _Limits(low, high, largest_offset, resolution, found.fun.size if size is None else size)
+    best = _judged(found.x, found.fun, np.asarray(found.jac), limits, int(found.nfev))
     if jacobian is None or found.status <= 0:
         return best
-    for taken in range(1, MOST_CLOSING_STEPS + 1):
+    for _ in range(MOST_CLOSING_STEPS):
         if best.converged or best.undetermined or best.at_limit.any():
             break
         x = best.x - np.linalg.lstsq(best.jacobian, best.residuals, rcond=None)[0]
         if not np.all((low < x) & (x < high)):
             break
-        nearer = judged(x, residuals(x), jacobian(x), taken)
-        if not nearer.offset < best.offset:
+        nearer = _judged(x, residuals(x), jacobian(x), limits, best.evaluations + 1)
+        grows = nearer.sum_of_squares > best.sum_of_squares * (1.0 + ROUNDING)
+        if grows or not nearer.offset < best.offset:
             break
         best = nearer
     return best
@@ -164,15 +166,18 @@ def minimise_from(starts: Iterable[Array], search: Callable[[Array], Optimum]) -
     return min((search(start) for start in starts), key=lambda found: found.sum_of_squares)
 
 
-def _judged(
-    x: Array,
-    residuals: Array,
-    jacobian: Array,
-    bounds: tuple[Array, Array],
-    largest_offset: float,
-    size: int,
-    evaluations: int,
-) -> Optimum:
+@dataclass(frozen=True, eq=False)
+class _Limits:
+    """What a point is judged by."""
+
+    low: Array
+    high: Array
+    offset: float
+    resolution: float
+    size: int
+
+
+def _judged(x: Array, residuals: Array, jacobian: Array, limits: _Limits, evaluations: int) -> Optimum:
     """Judge a point by rank, limits, and the orthogonality of the residuals to the columns of the Jacobian.
 
     Equation: P = |Q_1' r| / sqrt(p) / (|Q_2' r| / sqrt(n - p)), Q_1 a basis of the columns, Q_2 of the rest
@@ -182,26 +187,29 @@ def _judged(
         nowhere, reason = np.zeros(x.size, dtype=np.bool_), "the residuals or their derivatives are not finite"
         return Optimum(x, residuals, jacobian, evaluations, np.inf, np.inf, nowhere, (), reason)
     norms = np.linalg.norm(jacobian, axis=0)
-    spread = np.linalg.norm(residuals) / np.sqrt(max(size - x.size, 1))
-    at_limit = _at_limit(x, residuals @ jacobian, norms, bounds, float(spread))
+    spread = float(np.linalg.norm(residuals)) / np.sqrt(max(limits.size - x.size, 1))
+    at_limit = _at_limit(x, residuals @ jacobian, norms, (limits.low, limits.high), spread)
     free = np.flatnonzero(~at_limit)
     scaled = jacobian[:, free] / np.where(norms[free] > 0.0, norms[free], 1.0)
-    left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
+    # The triangle has the inner products of columns and residuals; its last row is what is orthogonal to all columns.
+    triangle = np.asarray(np.linalg.qr(np.column_stack([scaled, residuals]), mode="r"))
+    left, sizes, right = np.linalg.svd(triangle[: free.size, : free.size], full_matrices=False)
     largest = float(sizes[0]) if sizes.size else 0.0
     kept = sizes * LARGEST_CONDITION > largest
     missing = free.size - int(np.count_nonzero(kept))
-    condition = largest / float(sizes[-1]) if missing == 0 and free.size else np.inf if missing else 1.0
-    along = left.T @ residuals
-    rest = np.sqrt(max(float(residuals @ residuals - along @ along), 0.0) / max(size - free.size, 1))
+    condition = np.inf if missing else largest / float(sizes[-1]) if free.size else 1.0
+    along = left.T @ triangle[: free.size, -1]
+    rest = float(np.linalg.norm(triangle[free.size :, -1])) / np.sqrt(max(limits.size - free.size, 1))
     # An exact fit leaves rounding alone, which is orthogonal to nothing.
-    rounding = ROUNDING * float(np.linalg.norm(np.abs(jacobian) @ np.abs(x))) / np.sqrt(max(residuals.size, 1))
+    rounding = ROUNDING * float(np.linalg.norm(np.abs(jacobian) @ np.abs(x))) / np.sqrt(max(limits.size, 1))
     towards = float(np.linalg.norm(along)) / np.sqrt(max(free.size, 1))
-    offset = towards / max(rest, rounding) if max(rest, rounding) > 0.0 else 0.0
+    least = max(rest, limits.resolution)
+    offset = towards / least if least > 0.0 else np.inf if towards > rounding else 0.0
     undetermined = _undetermined(right, kept, free, norms) if missing else ()
     reason = ""
     if missing:
         reason = f"no residual tells variables {', '.join(map(str, undetermined))} apart, or depends on them"
-    elif offset > largest_offset and towards > rounding:
+    elif offset > limits.offset and towards > max(rounding, BY_CHANCE * limits.resolution):
         reason = f"ended after {evaluations} evaluations, {offset:.2g} standard errors from an optimum"
     return Optimum(x, residuals, jacobian, evaluations, offset, condition, at_limit, undetermined, reason)
 

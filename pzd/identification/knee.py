@@ -136,7 +136,7 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
             "W_s": fit.criterion,
             "rmse_N": rms(fit.residuals),
             "missed_share": misfit.share,
-            "status": _status(values, widths, misfit, tests.measured),
+            "status": _status(values, widths, misfit, tests.measured, converged=fit.converged),
         }
     )
 
@@ -202,7 +202,9 @@ def _quantity_name(column: str) -> str:
     return column.removesuffix(unit).replace("_", " ")
 
 
-def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array) -> str:
+def _status(
+    values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array, *, converged: bool
+) -> str:
     """Return `ok`, or the weak parameters with the reason; the gas is judged against the scale of the friction."""
     least = {"friction_N": friction_scale(values["friction_N"], measured)}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
@@ -211,6 +213,8 @@ def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Mi
         for name, value in values.items()
         if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
     ]
+    if not converged:
+        weak.append("the least squares have not converged")
     if misfit.is_large:
         weak.append(f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
     return f"weak: {'; '.join(weak)}" if weak else "ok"

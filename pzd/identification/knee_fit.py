@@ -18,6 +18,7 @@ from pzd.damper.compose import integrated_force, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
+from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
 from pzd.identification.trust import MISFIT_THRESHOLD
 from pzd.record import Array, Mask, Record, mid_stroke
@@ -256,8 +257,11 @@ EVALUATIONS = 60
 """Most evaluations with slopes in one descent."""
 REFIT_EVALUATIONS = 12
 """Most evaluations of a refit without a fold: it starts at the optimum of all tests, which one fold hardly moves."""
-TOLERANCE = 1e-5
-"""Relative tolerance of the least squares on parameters and criterion: far below any interval."""
+TOLERANCE = 1e-8
+"""Relative tolerance of the least squares on parameters and criterion: beyond it the differences show their own error.
+"""
+OFFSET = 1e-2
+"""Largest distance to the optimum [standard errors]: of an interval less than its second digit."""
 PROBE_EVALUATIONS = 4
 """Evaluations after which a straight line that fits as well as a knee is near its optimum."""
 NEAREST_KNEE = 0.01
@@ -281,6 +285,8 @@ class KneeFit:
     slopes: Array
     """(N, p + 2) derivatives of the force by the natural parameters of the form, by F_0 and by k_g."""
     criterion: float
+    converged: bool
+    """Whether the residuals are orthogonal to the slopes as far as their own size can tell."""
 
     def predicted(self, tests: KneeData) -> Array:
         """Predict the force (N,) of other tests of the damper [N]."""
@@ -332,8 +338,6 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
     gas : (2,) F_0 and k_g in the first force of a test; its effect is over before the counted samples
     evaluations : largest number
     """
-    from scipy.optimize import least_squares
-
     basis, _ = np.linalg.qr(tests.gas_columns)
     norm, peak = float(np.linalg.norm(tests.measured)), tests.peak
 
@@ -353,24 +357,22 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
 
     low, high = _search_bounds(tests, form)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
-    found = least_squares(
+    found = minimise(
         residuals,
         begin,
-        jac=slopes,
-        bounds=(low, high),
-        x_scale="jac",
-        xtol=TOLERANCE,
-        ftol=TOLERANCE,
-        gtol=TOLERANCE,
-        max_nfev=evaluations,
+        slopes,
+        (low, high),
+        precision=TOLERANCE,
+        evaluations=evaluations,
+        largest_offset=OFFSET,
+        resolution=FORCE_TOLERANCE / np.sqrt(tests.measured.size),
     )
     curve = form.found(found.x, peak)
     left = tests.measured - tests.simulated(curve, gas)
     of_gas = np.asarray(np.linalg.lstsq(tests.gas_columns, left, rcond=None)[0])
     left = left - tests.gas_columns @ of_gas
-    return KneeFit(
-        form, curve, of_gas, left, _natural_slopes(tests, form, curve, of_gas), criterion(left, tests.measured)
-    )
+    slopes_at_optimum = _natural_slopes(tests, form, curve, of_gas)
+    return KneeFit(form, curve, of_gas, left, slopes_at_optimum, criterion(left, tests.measured), found.converged)
 
 
 def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:

@@ -105,3 +105,14 @@ def test_of_several_starts_the_deepest_optimum_is_taken() -> None:
 def test_residuals_that_are_no_numbers_are_refused() -> None:
     with pytest.raises(ValueError, match="finite"):
         minimise(lambda x: np.full(3, np.nan) * x[0], np.ones(1))
+
+
+def test_what_a_model_computes_at_random_is_no_distance_from_the_optimum(rng: np.random.Generator) -> None:
+    columns, _ = line(rng)
+    jitter = 1e-9
+
+    def residuals(x: Array) -> Array:
+        return columns @ (x - [2.0, 3.0]) + jitter * np.sin(1e12 * columns[:, 1] * x[0])
+
+    assert not minimise(residuals, np.ones(2), lambda _: columns).converged
+    assert minimise(residuals, np.ones(2), lambda _: columns, resolution=jitter).converged
