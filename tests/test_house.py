@@ -44,6 +44,7 @@ ORDER = (
     "pipeline",
     "sweep",
     "paper",
+    "front",
     "cli",
     "__main__",
 )
