@@ -45,6 +45,7 @@ ORDER = (
     "pipeline",
     "sweep",
     "paper",
+    "front",
     "cli",
     "__main__",
 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value
-from pzd.cli.look import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
 from pzd.identification.config import GroupConfig, IdentifyConfig

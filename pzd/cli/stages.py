@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from pzd.cli.look import diagnosis_lines
 from pzd.cli.options import Call, on_config
 from pzd.cli.output import complain, exit_code
+from pzd.report.diagnosis_text import diagnosis_lines
 
 if TYPE_CHECKING:
     from pzd.runs import Run

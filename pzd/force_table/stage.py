@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from pzd.damper.model import Damper
 from pzd.force_table.config import TableConfig
 from pzd.quantities import Control
 from pzd.record import Record
+
+if TYPE_CHECKING:
+    from pzd.force_table.force import OperatingEnvelope
 
 log = logging.getLogger(__name__)
 
@@ -54,13 +58,43 @@ def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Con
     ----------
     table, rig, diagnosed, control, setting : as `tabulate`
     """
-    from pzd.force_table import force, lookup
+    from pzd.force_table import force
 
     damper = diagnosed.damper
     records = [record for record in rig.records if record.setting == setting]
     given = force.temperatures_of(diagnosed.baseline), force.voltages_of(diagnosed.baseline)
     envelope = force.operating_envelope(records, *given)
-    nodes = force.grid(table, damper, _temperatures(table, damper, records), envelope)
+    return _within(table, damper, _temperatures(table, damper, records), envelope, control)
+
+
+def untested_table(table: TableConfig, damper: Damper, control: Control) -> Table:
+    """Tabulate the force of a damper of known parameters, which is known at every speed up to that of the table.
+
+    Parameters
+    ----------
+    table : the config's block
+    damper : the damper
+    control : the control signal, for the text of the notes
+    """
+    from pzd.force_table import force
+
+    temperatures = force.temperatures_of(damper)
+    T, U = (np.array([v or 0.0 for v in values]) for values in (temperatures, force.voltages_of(damper)))
+    known = force.OperatingEnvelope(T, U, np.full((T.size, U.size), table.speed_max_m_per_s))
+    return _within(table, damper, temperatures, known, control)
+
+
+def _within(
+    table: TableConfig,
+    damper: Damper,
+    temperatures: Sequence[float | None],
+    envelope: OperatingEnvelope,
+    control: Control,
+) -> Table:
+    """Tabulate the force of a damper that is known within an envelope."""
+    from pzd.force_table import force, lookup
+
+    nodes = force.grid(table, damper, temperatures, envelope)
     notes = TableNotes(
         outside=table.outside,
         reached_m_per_s=float(np.nanmax(envelope.speeds)),

@@ -11,7 +11,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, UserError, read_text
 from pzd.schema.model import Frozen
 from pzd.schema.validate import canonical_nodes, misnamed, plain_data, validated
-from pzd.schema.yamltree import Entry, Node, collection, compose, written
+from pzd.schema.yamltree import Entry, Node, collection, compose, node_of, written
 
 Model = TypeVar("Model", bound=Frozen)
 
@@ -81,6 +81,16 @@ class Document:
         """
         found: Model = validated(model, canonical_nodes(self.root, control), control, self.error)
         return found
+
+
+def document_of(data: Mapping[str, Any]) -> Document:
+    """Return plain Python data as a document, for messages in the words that a file has.
+
+    Raises
+    ------
+    TypeError : when something in it is no plain data
+    """
+    return Document(Path(), node_of(data))
 
 
 def read_yaml(path: Path, error: type[UserError] = ConfigError) -> Document:

@@ -241,6 +241,32 @@ def collection(value: tuple[Node, ...] | Mapping[str, Entry], place: str) -> Nod
     return Node(value, place, 1 + sum(p.count for p in parts), 1 + max((p.height for p in parts), default=0))
 
 
+def node_of(data: Any, key: str = "") -> Node:
+    """Make a tree of plain Python data, as arguments of a function hold; what came from no file has no place.
+
+    Parameters
+    ----------
+    data : mappings, lists, tuples and arrays of scalars
+    key : where they stand, for messages
+
+    Raises
+    ------
+    TypeError : when something in it is none of these
+    """
+    if isinstance(data, Mapping):
+        entries = {str(name): Entry("", node_of(value, f"{key}.{name}".lstrip("."))) for name, value in data.items()}
+        return collection(entries, "")
+    if hasattr(data, "tolist"):  # an array, or one of its numbers
+        data = data.tolist()
+    if isinstance(data, list | tuple):
+        return collection(tuple(node_of(item, key) for item in data), "")
+    if data is not None and not isinstance(data, bool | int | float | str):
+        raise TypeError(
+            f"{key}: must be text, a number, true or false, a list or a mapping (got {type(data).__name__})"
+        )
+    return Node(data, "")
+
+
 def compose(text: str, name: object, error: type[UserError]) -> Node:
     """Build the tree of a YAML text.
 

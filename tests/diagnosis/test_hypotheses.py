@@ -13,7 +13,7 @@ import pytest
 from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
 
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
-from pzd.cli.look import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.effect import declared_effect
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig

@@ -12,7 +12,7 @@ from synthetic import TWO, all_but, coloured, damper_of, diagnosed, sines
 from test_naming import TRUTHS
 
 from pzd.artefacts import Diagnosed, ParameterRow, Value
-from pzd.cli.look import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.compose import respond
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper

@@ -7,7 +7,7 @@ import pytest
 
 from pzd.artefacts import Characteristics, Gap, Identified, ParameterRow
 from pzd.artefacts.identified import GasAndFrictionRow, PeakVelocityRow
-from pzd.cli.look import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.verdict import hold_out_note
 from pzd.force_table.force import lost, not_monotone

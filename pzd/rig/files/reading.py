@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import glob
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,18 @@ from pathlib import Path
 import numpy as np
 
 from pzd.artefacts import IngestRow
-from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.quantities import (
+    ACCELERATION,
+    DISPLACEMENT,
+    FORCE,
+    PRESSURE,
+    TEMPERATURE,
+    TIME,
+    VELOCITY,
+    VOLTAGE,
+    Control,
+    Quantity,
+)
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Fixture, Limits
 from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
@@ -23,9 +34,9 @@ from pzd.rig.files.child import end_child
 from pzd.rig.files.clock import clock_remarks
 from pzd.rig.files.counted import beside_counted
 from pzd.rig.files.formats import read_sheet
-from pzd.rig.files.layout import Layout, layouts
+from pzd.rig.files.layout import Layout, Values, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
-from pzd.rig.files.sheet import ReadingStep
+from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import safe_name
@@ -297,9 +308,13 @@ def read(
 
 def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]]:
     """Read the tests of one file, with displacement and force of the damper alone in each."""
-    entry = layout.entry
     values, setting = layout.values(path)
-    sheet = read_sheet(path, entry, layout.wanted(), layout.place)
+    return _tests_of(read_sheet(path, layout.entry, layout.wanted(), layout.place), layout, values, setting)
+
+
+def _tests_of(sheet: Sheet, layout: Layout, values: Values, setting: str | None) -> list[tuple[RawRecord, DamperAlone]]:
+    """Cut a sheet into tests, with displacement and force of the damper alone in each."""
+    entry = layout.entry
     by_rate = beside_counted(sheet, layout)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
@@ -312,3 +327,44 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]
         alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
         found.append((test, alone))
     return found
+
+
+# --- Arrays ---
+
+
+def from_arrays(
+    name: str,
+    channels: Mapping[Quantity, Array | float],
+    setting: str | None,
+    limits: Limits,
+    control: Control,
+) -> PreflightRecord:
+    """Make the record of one test that is given as arrays, on the way of a file with canonical columns.
+
+    Parameters
+    ----------
+    name : of the record
+    channels : (n,) each, in SI and degC; a label such as the control signal may be one number
+    setting : of the damper
+    limits : of the stand
+    control : the control signal
+
+    Raises
+    ------
+    DataError : when the test cannot be used
+    """
+    (layout,) = layouts((FilesEntry(path=name),), control, Path())
+    columns = {quantity: values for quantity, values in channels.items() if isinstance(values, np.ndarray)}
+    labels: Values = {q: (float(value),) for q, value in channels.items() if not isinstance(value, np.ndarray)}
+    sheet = Sheet(
+        path=Path(name),
+        header=tuple(control.renamed(quantity.column) for quantity in columns),
+        header_line=None,
+        units=None,
+        rows=columns[TIME].size,
+        numbers=dict(enumerate(columns.values())),
+    )
+    ((test, alone),) = _tests_of(sheet, layout, labels, setting)
+    if works_on_the_rig(alone):
+        raise DataError(sign_fault(test, alone, layout, ()))
+    return preflight_record(name, test, alone, limits, control)

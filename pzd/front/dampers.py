@@ -1,0 +1,326 @@
+"""A damper as the front door hands it out: its force along a motion, its steady curve, and its table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from typing_extensions import override
+
+from pzd.artefacts import Diagnosed, ForceRow, Table
+from pzd.damper.model import BaseRow
+from pzd.damper.model import Damper as Model
+from pzd.front.arguments import control_of, in_python, label, numbers
+from pzd.front.pipelines import config_of, pipeline_of
+from pzd.front.results import Result, frame_of, new_axes
+from pzd.quantities import FORCE, VELOCITY, Control
+from pzd.record import Array
+from pzd.schema.errors import ConfigError
+from pzd.schema.yamlfile import document_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from pzd.pipeline.execution import InMemory
+
+_DRAWN = 401
+"""Velocities of a drawn curve, evenly spaced: 0 is one of them."""
+_FASTEST = 1.0
+"""Up to which speed a curve is drawn where nothing was tested [m/s]."""
+
+
+class Damper(Result):
+    """A damper: the Bingham element over the control signal and temperature, and its effects."""
+
+    @in_python
+    def __init__(
+        self,
+        base: Any,
+        effects: Mapping[str, Any] | None = None,
+        reference_temperature_degC: float | None = None,
+        zero_m: float = 0.0,
+        control: Any = ("voltage", "V"),
+    ) -> None:
+        """Make a damper of known parameters, as `damper:` of a virtual rig has them.
+
+        Parameters
+        ----------
+        base : rows of T0_N, C_Ns_per_m, k_N_per_m, each with voltage_V and temperature_degC where there are several
+        effects : parameters of each effect by its name, see `pzd effects`
+        reference_temperature_degC : of `temperature_drift`
+        zero_m : displacement from which `end_stop` and `gas_spring` count
+        control : name and unit of the control signal
+
+        Raises
+        ------
+        ValueError : when a value is none that a damper has
+        """
+        if isinstance(base, Mapping):
+            base = [base]
+        data = {"base": base, "effects": effects or {}, "zero_m": zero_m}
+        data["reference_temperature_degC"] = reference_temperature_degC
+        signal = control_of(control)
+        self.control = signal
+        """The control signal."""
+        self.model = document_of(data).validated(Model, signal)
+        """The damper as data, which the stages take."""
+        self.behind: InMemory | None = None
+        """The pipeline that it was found in, whose records say what was tested; None for known parameters."""
+
+    @classmethod
+    def of(cls, model: Model, control: Control, behind: InMemory | None = None) -> Self:
+        """Return the damper of a stage.
+
+        Parameters
+        ----------
+        model : the damper
+        control : the control signal
+        behind : the pipeline that it was found in, whose records say what was tested
+        """
+        made = cls.__new__(cls)
+        made.model, made.control, made.behind = model, control, behind
+        return made
+
+    @property
+    def effects(self) -> dict[str, dict[str, float | tuple[float, ...]]]:
+        """Parameters of each effect by its name."""
+        return {name: dict(values) for name, values in self.model.effects.items()}
+
+    @property
+    def voltages(self) -> tuple[float, ...]:
+        """Values of the control signal at which its parameters are known, rising; none without a control signal."""
+        return tuple(sorted({row.voltage_V for row in self.model.base if row.voltage_V is not None}))
+
+    @property
+    def temperatures(self) -> tuple[float, ...]:
+        """Temperatures at which its parameters are known, rising [degC]."""
+        return tuple(sorted({row.temperature_degC for row in self.model.base if row.temperature_degC is not None}))
+
+    @in_python
+    def force(
+        self, time: Any, displacement: Any, voltage: Any = None, temperature: Any = None, velocity: Any = None
+    ) -> Array:
+        """Compute the force along a motion, with the oil spring, from a damper that is relaxed at the first sample.
+
+        Parameters
+        ----------
+        time : (n,) strictly increasing [s]
+        displacement : (n,) extension [m]
+        voltage : control signal, a number or (n,); may be left out where the damper was identified at a single one
+        temperature : a number or (n,) [degC]; by default the lowest at which the damper is known
+        velocity : (n,) rate of extension [m/s]; by default from the displacement, as for a record
+
+        Returns
+        -------
+        (n,) force [N]
+
+        Raises
+        ------
+        TypeError, ValueError : when an argument is no such array, time does not increase, or the voltage is missing
+        """
+        from pzd.damper.compose import respond
+        from pzd.damper.motion import Motion
+        from pzd.record import clock_fault
+        from pzd.signals.cycles import cycles
+        from pzd.signals.kinematics import kinematics
+
+        t = numbers("time", time)
+        if t.size < 2:
+            raise ValueError(f"time: a motion needs two samples at least (got {t.size})")
+        if fault := clock_fault(t):
+            raise ValueError(f"time: index {fault[0]}: {fault[1]}")
+        x = numbers("displacement", displacement, t.size)
+        v = None if velocity is None else numbers("velocity", velocity, t.size)
+        clean = kinematics(t, x, cycles(t, x))
+        channels = [
+            self._channel(name, value, t.size) for name, value in (("voltage", voltage), ("temperature", temperature))
+        ]
+        motion = Motion(t, x, clean.velocity if v is None else v, clean.acceleration, *channels)
+        return respond(self.model, motion)
+
+    @in_python
+    def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:
+        """Compute the force at steady velocities, as the table of force holds it.
+
+        A force that is there at rest, such as a gas force, is not in it; at v = 0 it is that of a slow extension.
+
+        Parameters
+        ----------
+        velocity : (n,) rate of extension [m/s]
+        voltage : control signal, a number or (n,)
+        temperature : [degC]; by default the lowest at which the damper is known
+
+        Returns
+        -------
+        (n,) force [N]
+
+        Raises
+        ------
+        TypeError, ValueError : when an argument is no such array, or the voltage is missing
+        """
+        from pzd.damper.compose import steady_force
+
+        v = numbers("velocity", velocity)
+        u, warm = self._label("voltage", voltage, v.size), self._label("temperature", temperature, 1)
+        return np.asarray(steady_force(self.model, u, None if warm is None else float(np.max(warm)), v))
+
+    def _channel(self, name: str, value: Any, size: int) -> Array | None:
+        given = self._label(name, value, size)
+        return None if given is None else np.full(size, given) if isinstance(given, float) else given
+
+    def _label(self, name: str, value: Any, size: int) -> Array | float | None:
+        """Return a control signal or a temperature, the only or lowest known one where none is given."""
+        known = self.voltages if name == "voltage" else self.temperatures
+        called = self.control.name if name == "voltage" else name
+        if value is not None:
+            return label(called, value, size)
+        if name == "voltage" and len(known) > 1:
+            listed = ", ".join(f"{each:g}" for each in known)
+            raise ValueError(
+                f"{called}: the damper depends on it; give one, it is known at {listed} {self.control.unit}"
+            )
+        return known[0] if known else None
+
+    @override
+    def lines(self) -> list[str]:
+        rows = self.model.base
+        effects = [
+            f"  {name}: {', '.join(f'{key} = {_shown(value)}' for key, value in values.items())}"
+            for name, values in self.model.effects.items()
+        ]
+        at = [f"{len(self.voltages)} values of the {self.control.name}"] if len(self.voltages) > 1 else []
+        at += [f"{len(self.temperatures)} temperatures"] if len(self.temperatures) > 1 else []
+        head = f"Damper, {' and '.join(at)}" if at else "Damper"
+        spans = [
+            f"{symbol} {_span([getattr(row, name) for row in rows])} {unit}"
+            for symbol, name, unit in (("T0", "T0_N", "N"), ("C", "C_Ns_per_m", "N s/m"), ("k", "k_N_per_m", "N/m"))
+        ]
+        return [f"{head}: {', '.join(spans)}", *effects]
+
+    @override
+    def to_frame(self) -> pd.DataFrame:
+        """Return T0, C and k by control signal and temperature."""
+        return frame_of(self.model.base, BaseRow, self.control)
+
+    @override
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the steady force over velocity, a line for each control signal."""
+        ax = new_axes(ax)
+        fastest = reached(self.behind)
+        for voltage in self.voltages or (None,):
+            for side in (-1.0, 1.0):  # the friction jumps at rest
+                v = side * np.linspace(0.0, fastest, _DRAWN // 2)
+                shown = f"{voltage:g} {self.control.unit}" if voltage is not None and side > 0.0 else None
+                colour = ax.lines[-1].get_color() if side > 0.0 else None
+                ax.plot(v, self.curve(v, voltage), color=colour, label=shown)
+        ax.set(xlabel=VELOCITY.label, ylabel=FORCE.label)
+        if self.voltages:
+            ax.legend()
+        return ax
+
+
+def reached(behind: InMemory | None) -> float:
+    """Return the largest speed of the records behind a damper [m/s]; 1 where there are none."""
+    from pzd.artefacts import Rig
+
+    records = behind.of(Rig).records if behind is not None else ()
+    return max((float(np.max(np.abs(record.velocity))) for record in records), default=_FASTEST)
+
+
+def _shown(value: float | tuple[float, ...]) -> str:
+    return f"{value:.4g}" if isinstance(value, float | int) else f"[{', '.join(f'{each:.4g}' for each in value)}]"
+
+
+def _span(values: list[float]) -> str:
+    low, high = min(values), max(values)
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+
+
+# --- The table ---
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ForceTable(Result):
+    """Force over control signal and velocity, as the stage table makes it."""
+
+    table: Table
+    """The artefact."""
+    control: Control = field(default_factory=Control)
+
+    @override
+    def lines(self) -> list[str]:
+        rows, notes = self.table.force, self.table.notes
+        nodes = [len({getattr(row, name) for row in rows}) for name in ("temperature_degC", "voltage_V")]
+        nodes_of = f"{nodes[1]} of {self.control.name}, {nodes[0]} of temperature"
+        return [
+            f"Table of force: {len(rows)} rows, {nodes_of}, tested up to {notes.reached_m_per_s:.3g} m/s",
+            *(f"  not in it: {line}" for line in notes.lost),
+            *(f"  {line}" for line in notes.not_monotone),
+        ]
+
+    @override
+    def to_frame(self) -> pd.DataFrame:
+        """Return the rows of force.csv."""
+        return frame_of(self.table.force, ForceRow, self.control)
+
+    @override
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw force over velocity, a line for each control signal at the lowest temperature."""
+        ax, frame = new_axes(ax), self.to_frame()
+        key = self.control.renamed("voltage_V")
+        frame = frame[frame["temperature_degC"].fillna(0.0) == frame["temperature_degC"].fillna(0.0).min()]
+        for voltage, rows in frame.groupby(key, dropna=False):
+            ax.plot(rows["velocity_m_per_s"], rows["force_N"], label=f"{voltage:g} {self.control.unit}")
+        ax.set(xlabel=VELOCITY.label, ylabel=FORCE.label)
+        if frame[key].notna().any():
+            ax.legend()
+        return ax
+
+
+@in_python
+def table(damper: Damper, **keys_of_the_block: Any) -> ForceTable:
+    """Tabulate the force of a damper over control signal and velocity.
+
+    Parameters
+    ----------
+    damper : of `identify` or `diagnose`, with what their tests reached; or one of known parameters
+    keys_of_the_block : keys of `table` in a config
+
+    Raises
+    ------
+    TypeError : when it is no damper
+    ValueError : when a key is none that a config may have
+    """
+    return ForceTable(table_stage(damper, dict(keys_of_the_block)), damper.control)
+
+
+def table_stage(damper: Any, keys: Mapping[str, Any]) -> Table:
+    """Return the artefact of the stage table for a damper.
+
+    Raises
+    ------
+    TypeError : when it is no damper
+    ConfigError : when a key is none that a config may have
+    """
+    from pzd.force_table.stage import untested_table
+
+    if not isinstance(damper, Damper):
+        raise TypeError(
+            f"damper: must be a pzd.Damper, such as found.damper of pzd.diagnose (got {type(damper).__name__})"
+        )
+    block = config_of(damper.control, table=keys).table
+    if damper.behind is None:
+        return untested_table(block, damper.model, damper.control)
+    behind = damper.behind
+    config = behind.config.model_copy(update={"table": block})
+    known = {folder: made for folder, made in behind.artefacts.items() if folder != Table.folder}
+    found = known.get(Diagnosed.folder)
+    if not isinstance(found, Diagnosed) or found.damper is not damper.model:
+        known[Diagnosed.folder] = Diagnosed.undiagnosed(damper.model)
+    made = pipeline_of(config, known).through("table")[Table.folder]
+    if not isinstance(made, Table):
+        raise ConfigError("table: no table was made")
+    return made

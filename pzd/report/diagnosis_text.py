@@ -1,0 +1,189 @@
+"""The diagnosis as about ten lines of text, for the terminal and a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pzd.schema.errors import counted
+
+if TYPE_CHECKING:
+    from pzd.artefacts import (
+        Diagnosis,
+        HeldOutTest,
+        HeldOutVoltage,
+        Hypotheses,
+        HypothesisRow,
+        NextTest,
+        Prediction,
+        Value,
+    )
+    from pzd.quantities import Control
+
+_VERDICTS = {
+    "named": "one answer fits, and no other does",
+    "ambiguous": "several answers fit the data",
+    "none": "nothing is missing that the data can show",
+    "unexplained": "a gap that repeats remains, and no name accounts for it",
+}
+_MOST = 3
+"""How many regions and candidates are listed."""
+_MOST_SHAPES = 2
+"""How many shapes of the residual force, each by itself."""
+
+
+def _number(value: float | None, unit: str = "") -> str:
+    """Return a number with its unit as tables of the terminal have it."""
+    from pzd.report.columns import TERMINAL  # here, since `pzd --help` needs neither tables nor numpy
+
+    return TERMINAL.amount(value, unit)
+
+
+def diagnosis_lines(
+    diagnosis: Diagnosis, control: Control, *, every_test: bool = False, hypotheses: Hypotheses | None = None
+) -> list[str]:
+    """Return what is missing, where, how sure that is, how far it closes the gap, and what to test next.
+
+    Parameters
+    ----------
+    diagnosis : the artefact of diagnose
+    control : the control signal, for its unit
+    every_test : whether the prediction of each held-out test and voltage is listed too
+    hypotheses : shapes of the residual force, if any were looked for
+    """
+    unit = control.unit
+    lines = [
+        f"verdict: {diagnosis.verdict}, {_VERDICTS[diagnosis.verdict]}",
+        f"reason: {diagnosis.reason}",
+        _gap(diagnosis),
+    ]
+    if diagnosis.prediction:
+        lines += _prediction(diagnosis.prediction, unit, every_test=every_test)
+    lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
+    lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
+    if diagnosis.confidence is not None:
+        lines.append(f"confidence: {diagnosis.confidence:.0%}{_open_names(diagnosis)}")
+    if diagnosis.rivals:
+        lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
+    lines += [*_rejected(diagnosis), *(_hypotheses(hypotheses) if hypotheses else ())]
+    if diagnosis.next_test:
+        lines.append(_next(diagnosis.next_test, unit))
+    return lines
+
+
+def _open_names(diagnosis: Diagnosis) -> str:
+    """Return the effects that the confidence of an ambiguous verdict is about."""
+    if diagnosis.verdict != "ambiguous":
+        return ""
+    named = [*diagnosis.effects, *diagnosis.rivals] + ["nothing"] * (not diagnosis.effects)
+    return f" that it is {' or '.join(named)}" if len(named) > 1 else ""
+
+
+def _gap(diagnosis: Diagnosis) -> str:
+    gap = diagnosis.gap
+    if gap is None:
+        return "gap: could not be measured"
+    share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
+    records = counted(len(gap.held_out), "record")
+    held_out = {"records": records, "mixed": f"{records}, whole or in part"}.get(
+        gap.hold_out, f"{gap.hold_out} of {records}"
+    )
+    return (
+        f"gap on what no fit has seen ({held_out}): W_s {_number(gap.before)} before, {_number(gap.after)} after"
+        f"{share}; noise alone gives {_number(gap.noise_floor)}"
+    )
+
+
+def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
+    def errors(each: Prediction | HeldOutTest | HeldOutVoltage) -> str:
+        return f"W_s {_number(each.W_s_plain)} plain, {_number(each.W_s)} as handed on"
+
+    held_out = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")
+    yield f"prediction of {held_out} kept back: {errors(found)}"
+    if every_test:
+        for each in found.by:
+            at = "" if each.voltage is None else f" at {_number(each.voltage, unit)}"
+            # An earlier version wrote no R2.
+            R2 = "" if each.R2 is None or each.R2_plain is None else f"; R2 {each.R2_plain:.4f} and {each.R2:.4f}"
+            yield f"kept back: {each.record}{at}, {errors(each)}{R2}"
+    listed = sorted(found.left_out_voltages, key=lambda left: -left.W_s)
+    for left in listed if every_test else listed[:1]:
+        yield f"left out: {_number(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
+
+
+def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
+    values = diagnosis.parameters.get(effect, {})
+    text = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+    return f"{text} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else text
+
+
+def _value(value: Value, unit: str) -> str:
+    """Return a parameter with its interval, or one value for each control value."""
+    from pzd.report.columns import TERMINAL
+
+    edited = " (edited by hand)" if value.low95 is None and value.high95 is None else ""
+    if value.at_voltage_V is not None:
+        pairs = zip(value.estimates, value.at_voltage_V, strict=True)
+        return "; ".join(f"{_number(one.value, value.unit)} at {_number(at, unit)}" for one, at in pairs) + edited
+    (estimate,) = value.estimates
+    if estimate.interval is None:
+        return f"{_number(estimate.value, value.unit)}{edited}"
+    return f"{TERMINAL.text(estimate, value.unit)}{edited}"
+
+
+def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
+    listed = {*diagnosis.effects, *diagnosis.rivals}
+    others = [one for one in diagnosis.ranking if one.effect not in listed]
+    adopted = {one.effect: one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects}
+    # What was added for its prediction alone was in no round of the search: then no figure there is the damper's.
+    whole = adopted.keys() == {*diagnosis.effects}
+    against = f" against {_number(min(adopted.values()))}" if adopted and whole else ""
+    for one in others[:_MOST]:
+        yield f"not taken: {one.effect}, W_s {_number(one.gap_after)}{against} on the tests seen, {one.reason}"
+
+
+def _hypotheses(found: Hypotheses) -> Iterator[str]:
+    """Yield the best shapes of the residual force, and those beside the best; nothing where none was looked for."""
+    if found.sought and not found.rows:
+        yield "hypothesis: none, no shape of what is left predicts tests kept back beyond two standard errors"
+    for row in found.alone[:_MOST_SHAPES]:
+        yield f"{'hypothesis' if row.place == 1 else 'or'}: {_shape(row)}; {_physics(row)}"
+    for row in found.together:
+        yield f"and beside {row.beside}: {_shape(row)} together; {_physics(row)}"
+
+
+def _shape(row: HypothesisRow) -> str:
+    """Return a shape with its coefficient, and the share of the gap that it would close."""
+    from pzd.artefacts.csv_rows import Estimate
+    from pzd.report.columns import TERMINAL
+
+    more = f" and {_number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
+    value = TERMINAL.interval(Estimate.of(row, "coefficient"))
+    at = f", {row.parameter} = {_number(row.parameter_value, row.parameter_unit or '')}" if row.parameter else ""
+    closes = f"would close {row.closes:.0%} of the gap on tests kept back"
+    unit = "" if row.unit == "-" else f" {row.unit}"
+    return f"c {row.shape}, c = {value}{more}{unit}{at}: {closes}"
+
+
+def _physics(row: HypothesisRow) -> str:
+    """Return what has the shape, and which effect of the library, if any."""
+    return f"{row.physics} ({row.library} has this shape)" if row.library else row.physics
+
+
+def _next(test: NextTest, unit: str) -> str:
+    voltages = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
+    parts = [
+        test.waveform,
+        _number(test.frequency_Hz, "Hz") if test.frequency_Hz is not None else "",
+        _number(test.amplitude_m, "m") if test.amplitude_m is not None else "",
+        f"about {test.middle_m:.6g} m" if test.middle_m is not None else "",
+        f"at {' and '.join(_number(v, unit) for v in voltages)}" if voltages != (None,) else "",
+    ]
+    peaks = ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
+    reached = [_number(value, of) for value, of in peaks if value is not None]
+    far = f", up to {' and '.join(reached)}" if reached else ""
+    aim = f" to tell {' from '.join(test.separates)}" if test.separates else ""
+    if test.between_voltage_V is not None:
+        low, high = (_number(voltage) for voltage in test.between_voltage_V)
+        aim = f", since between {low} and {high} {unit} the force is known least"
+    return f"next test: {' '.join(part for part in parts if part)}{far}{aim}"
