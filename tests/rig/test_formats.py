@@ -128,6 +128,15 @@ def mts(
     write(path, text)
 
 
+def lvm(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) -> None:
+    above = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
+    said = "\t".join(["Y_Unit_Label", *(units[head] for head in columns if head != "time")])
+    heads = "\t".join(["X_Value", *(head for head in columns if head != "time"), "Comment"])
+    end = "***End_of_Header***"
+    samples = "\t".join(["Samples", *[str(TIME.size)] * 3])
+    write(path, [*above, end, "", "Channels\t3", samples, said, end, heads, *lines(columns, "\t")[1:]])
+
+
 WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "excel": ("a.xlsx", excel, NAMED | {"units_row": True}),
     "parquet": ("a.parquet", parquet, NAMED),
@@ -141,6 +150,7 @@ WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "tdms": ("a.tdms", tdms, NAMED),
     "mdf": ("a.mf4", mdf, NAMED),
     "mts": ("a.dat", mts, NAMED),
+    "lvm": ("a.lvm", lvm, {"columns": NAMED["columns"] | {"time": "X_Value"}}),
 }
 every_format = pytest.mark.parametrize("name", WRITERS)
 
@@ -156,7 +166,7 @@ def test_every_value_of_a_format_is_read(tmp_path: Path, name: str) -> None:
     rig = run(tmp_path, {"path": file} | entry)
     (record,) = rig.records
     assert record.voltage is not None
-    exact = 1e-8 if name == "mts" else 1e-15  # text of nine digits
+    exact = 1e-8 if name in ("mts", "lvm") else 1e-15  # text of nine digits
     assert record.time == pytest.approx(TIME, abs=exact)
     assert record.displacement == pytest.approx(X, abs=exact)
     assert record.force == pytest.approx(FORCE, abs=max(exact, 1e-12) * 1e2)
@@ -316,18 +326,6 @@ def test_a_key_that_stands_twice_in_an_object_is_refused(tmp_path: Path) -> None
     (tmp_path / "a.json").write_text(text.replace('"load [kN]"', '"load [kN]": [1], "load [kN]"'), encoding="utf-8")
     (said,) = refused(tmp_path, {"path": "a.json"} | WRITERS["json_arrays"][2])
     assert said.endswith("a.json: the key 'load [kN]' stands twice in one object")
-
-
-def test_waveforms_of_different_clocks_are_not_one_table(tmp_path: Path) -> None:
-    from nptdms import ChannelObject, TdmsWriter
-
-    with TdmsWriter(tmp_path / "a.tdms") as writer:
-        for head, step in (("pos", 2e-3), ("load", 1e-3)):
-            said = {"unit_string": UNITS[head], "wf_increment": step}
-            writer.write_segment([ChannelObject("Run", head, COLUMNS[head], said)])
-    entry = {"path": "a.tdms", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
-    (said,) = refused(tmp_path, entry)
-    assert "a.tdms:Run clock 1: missing column load; it stands in table 'Run clock 2'" in said
 
 
 def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_are_numbered(tmp_path: Path) -> None:

@@ -38,6 +38,9 @@ ROUNDING = 1e-9
 """A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant:
 conversion of units leaves some 1e-16, and no sensor resolves 1e-9."""
 
+SPARSE = 0.5
+"""Share of filled cells up to which a control signal, temperature or pressure is one that was written now and then, and
+holds between; with fewer empty cells some are missing."""
 LARGEST = 1e15
 """Magnitude in SI above which a cell is no measurement: its square would still be a number, but of nothing."""
 
@@ -91,35 +94,49 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
     if layout.entry.rate_Hz is not None:
         values |= _clock(sheet, layout, found)
     faults: list[str] = []
+    held: dict[Quantity, int] = {}
     for source in found:
         if source.dated:
             continue
-        cells = sheet.numbers[source.column]
-        empty = np.flatnonzero(np.isnan(cells))
-        if empty.size == cells.size and source.spec.quantity in OPTIONAL:
+        quantity, cells = source.spec.quantity, sheet.numbers[source.column]
+        if quantity in OPTIONAL and np.isnan(cells).all():
             continue
-        if empty.size:
-            more = f" ({empty.size} such cells)" if empty.size > 1 else ""
-            faults.append(f"{sheet.place(int(empty[0]))}: {sheet.header[source.column]}: empty cell{more}")
-            continue
-        try:
-            channel = source.spec.sign * to_canonical(cells, source.unit, source.spec.own)
-        except UnitError as fault:
-            raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
-        absurd = np.flatnonzero(np.abs(channel) > LARGEST)
-        if absurd.size:
-            more = f", and {absurd.size - 1} more such cells" if absurd.size > 1 else ""
-            place, head = sheet.place(int(absurd[0])), sheet.header[source.column]
-            faults.append(f"{place}: {head}: no {source.spec.own.name} is so large (got {cells[absurd[0]]:g}{more})")
-            continue
-        values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
+        if quantity in LABELS and _is_sparse(cells, sheet.starts):
+            held[quantity] = int(np.count_nonzero(np.isfinite(cells)))
+            cells = _held(cells)
+        channel = _channel(sheet, layout, source, cells, faults)
+        if channel is not None:
+            values[quantity] = _steady(channel) if quantity in LABELS else channel
     if faults:
         return Channels(_clock(sheet, layout, found), tuple(faults))
-    remarks, steps = tuple(_remarks(sheet, found)), tuple(_steps(sheet, layout, found, values))
+    remarks, steps = tuple(_remarks(sheet, found)), tuple(_steps(sheet, layout, found, values, held))
     return Channels(values, remarks=remarks, steps=steps)
 
 
-def _steps(sheet: Sheet, layout: Layout, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[ReadingStep]:
+def _channel(sheet: Sheet, layout: Layout, source: _Source, cells: Array, faults: list[str]) -> Array | None:
+    """Convert the cells of a column to SI; None, and a fault more, where one is empty or absurd."""
+    head, own = sheet.header[source.column], source.spec.own
+    empty = np.flatnonzero(np.isnan(cells))
+    if empty.size:
+        more = f" ({empty.size} such cells)" if empty.size > 1 else ""
+        faults.append(f"{sheet.place(int(empty[0]))}: {head}: empty cell{more}")
+        return None
+    try:
+        channel = source.spec.sign * to_canonical(cells, source.unit, own)
+    except UnitError as fault:
+        raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
+    absurd = np.flatnonzero(np.abs(channel) > LARGEST)
+    if absurd.size:
+        more = f", and {absurd.size - 1} more such cells" if absurd.size > 1 else ""
+        place = sheet.place(int(absurd[0]))
+        faults.append(f"{place}: {head}: no {own.name} is so large (got {cells[absurd[0]]:g}{more})")
+        return None
+    return channel
+
+
+def _steps(
+    sheet: Sheet, layout: Layout, found: list[_Source], values: dict[Quantity, Array], held: dict[Quantity, int]
+) -> Iterator[ReadingStep]:
     """Report what was done to each column, and that samples were counted for the time."""
     for source in found:
         spec, own, head = source.spec, source.spec.own, sheet.header[source.column]
@@ -135,10 +152,24 @@ def _steps(sheet: Sheet, layout: Layout, found: list[_Source], values: dict[Quan
             offset = f" {start:+.10g}" if start else ""
             if offset or end != 1.0:
                 yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {end - start:.10g}{offset}")
+        if spec.quantity in held:
+            every = f"{held[spec.quantity]} of {sheet.rows} cells filled"
+            yield ReadingStep("value", own.name, every, "held from each to the next")
         if spec.sign < 0:
             yield ReadingStep("sign", own.name, "as recorded", "times -1")
     if layout.entry.rate_Hz is not None:
         yield ReadingStep("clock", TIME.name, "no column", f"samples counted at {layout.entry.rate_Hz:.10g} Hz")
+
+
+def _is_sparse(cells: Array, starts: tuple[int, ...]) -> bool:
+    """Whether a column (rows,) is written now and then alone, from the first row of every recording on."""
+    filled = np.isfinite(cells)
+    return bool(filled[list(starts)].all() and np.count_nonzero(filled) <= SPARSE * cells.size)
+
+
+def _held(cells: Array) -> Array:
+    """Return a column (rows,) with every empty cell that of the last one filled."""
+    return np.asarray(cells[np.maximum.accumulate(np.where(np.isfinite(cells), np.arange(cells.size), 0))])
 
 
 def _remarks(sheet: Sheet, found: list[_Source]) -> Iterator[Finding]:

@@ -79,6 +79,8 @@ class Layout:
             texts=frozenset(texts),
             beside=None if self.entry.rate_Hz is None else LIKE_A_CLOCK,
             needed=tuple(frozenset(spec.headers) for spec in self.channels if spec.quantity in NEEDED),
+            held=frozenset(header for spec in self._labels() for header in spec.headers),
+            quantities={header: spec.own.name for spec in self.channels for header in spec.headers},
         )
 
     def values(self, path: Path) -> tuple[Values, str | None]:

@@ -38,6 +38,10 @@ class Wanted:
     """Further columns of numbers, by what their headers are like; cells that are none do no harm there."""
     needed: tuple[frozenset[str], ...] = ()
     """For each quantity that a recording must have, the headers that may hold it."""
+    held: frozenset[str] = frozenset()
+    """Columns whose value holds until the next sample: what labels a test."""
+    quantities: Mapping[str, str] = field(default_factory=dict)
+    """Header -> name of its quantity."""
 
     def as_numbers(self, head: str) -> bool:
         """Whether a column is to be read as numbers."""
@@ -150,6 +154,14 @@ class FileTable:
     """(rows,) line of every data row in the file, None where a format has no lines."""
     header_line: int | None = None
     """Line of the headers, None where a format has no lines."""
+    clock: str = ""
+    """Header of the column of seconds, where the format says which it is."""
+    begins: float | None = None
+    """Its zero on the clock that tables of the file share [s]; None where they share none."""
+    group: str = ""
+    """Name of the recording of which this table is a part; empty where it is one by itself."""
+    steps: tuple[ReadingStep, ...] = ()
+    """What made the table."""
 
     @property
     def rows(self) -> int:
@@ -157,19 +169,18 @@ class FileTable:
         return len(self.cells[0]) if self.cells else 0
 
 
-def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wanted: Wanted) -> Sheet:
-    """Read the wanted columns of every table that holds a recording, one below the other.
+def named_tables(path: Path, tables: Sequence[FileTable], pattern: str | None) -> list[FileTable]:
+    """Select the tables with data rows by their names.
 
     Parameters
     ----------
     path : the file
     tables : of the file
     pattern : name or pattern of the tables to read; by default every one
-    wanted : the columns to read
 
     Raises
     ------
-    DataError : when there is no such table, none has rows, or two of them differ in columns or units that are wanted
+    DataError : when there is no such table, or none has rows
     """
     filled = [table for table in tables if table.rows]
     if not filled:
@@ -177,8 +188,26 @@ def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wante
     named = [table for table in filled if pattern is None or fnmatchcase(table.name, pattern)]
     if not named:
         raise DataError(f"{at(path)}: no table {pattern!r} (got {', '.join(table.name for table in filled)})")
+    return named
+
+
+def sheet_of(path: Path, named: Sequence[FileTable], others: Sequence[FileTable], wanted: Wanted) -> Sheet:
+    """Read the wanted columns of every table that holds a recording, one below the other.
+
+    Parameters
+    ----------
+    path : the file
+    named : tables that may be read
+    others : tables that are left out by their names
+    wanted : the columns to read
+
+    Raises
+    ------
+    DataError : when two of the tables differ in columns or units that are wanted
+    """
     taken = [table for table in named if _matches(table, wanted) == len(wanted.needed)]
     taken = taken or [max(named, key=lambda table: _matches(table, wanted))]
+    left = [*(table for table in named if table not in taken), *others]
     first = taken[0]
     asked = wanted.numbers | wanted.texts
     faults = [fault for other in taken[1:] for fault in _differences(path, first, other, asked)]
@@ -194,8 +223,8 @@ def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wante
         None if first.lines is None else np.concatenate([t.lines for t in taken if t.lines is not None]),
         starts=starts,
         tables=tuple(table.name for table in taken),
-        elsewhere={head: table.name for table in filled if table not in taken for head in table.header},
-        steps=tuple(_steps(filled, taken, asked)),
+        elsewhere={head: table.name for table in left for head in table.header},
+        steps=tuple(_steps(left, taken, asked)),
     )
     return _with_cells(bare, taken, wanted)
 
@@ -352,18 +381,18 @@ def _unit(table: FileTable, head: str) -> str:
     return "" if table.units is None else table.units[table.header.index(head)]
 
 
-def _steps(tables: Sequence[FileTable], taken: Sequence[FileTable], asked: Iterable[str]) -> Iterator[ReadingStep]:
+def _steps(left: Sequence[FileTable], taken: Sequence[FileTable], asked: Iterable[str]) -> Iterator[ReadingStep]:
     """Report the tables and columns that are read, and those that are left out."""
     names = ", ".join(repr(table.name) for table in taken if table.name)
     yield ReadingStep("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
     unread = list(dict.fromkeys(head for table in taken for head in table.header if head not in asked))
     if unread:
         yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
-    for table in tables:
-        if table not in taken:
-            yield ReadingStep(
-                "left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for"
-            )
+    for table in left:
+        yield ReadingStep(
+            "left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for"
+        )
+    yield from dict.fromkeys(step for table in taken for step in table.steps)
 
 
 def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> Sheet:

@@ -32,6 +32,7 @@ from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
+from pzd.rig.files.one_clock import headers_together
 from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
@@ -39,7 +40,7 @@ from pzd.schema.errors import DataError, at
 # --- Quantity of a column, by its header in English, German, French or Spanish ---
 
 _LOOKS_LIKE = {
-    TIME: r"^t$|^tout$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
+    TIME: r"^t$|^tout$|^x_value$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
     VELOCITY: r"^v$|vel|speed|geschw|vitesse",
     ACCELERATION: r"^a$|acc|beschl|acel",
@@ -263,6 +264,8 @@ def described(path: Path) -> tuple[Dialect, str]:
         sniffs = [dialect for rows in sheets.values() if (dialect := sniffed_rows(rows)) is not None]
     else:
         filled = [table for table in tables_in(path, entry, module) if table.rows]
+        together = headers_together(filled)
+        filled += [together] if together else []
         sniffs = [Dialect(t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells)) for t in filled]
     if not sniffs:
         raise DataError(f"{at(path)}: {module.KIND} without a table of numbers below headers")

@@ -21,7 +21,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from pzd.rig.files.child import as_plain, read_in_child
-from pzd.rig.files.sheet import FileTable, Sheet, Wanted, sheet_of
+from pzd.rig.files.one_clock import on_one_clock
+from pzd.rig.files.sheet import FileTable, Sheet, Wanted, named_tables, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 if TYPE_CHECKING:  # the child has no use for it, and its import takes long
@@ -92,7 +93,10 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
     if hasattr(module, "read"):
         sheet: Sheet = module.read(path, entry, wanted)
         return sheet
-    return sheet_of(path, tables_in(path, entry, module), entry.table, wanted)
+    tables = tables_in(path, entry, module)
+    named = named_tables(path, tables, entry.table)
+    others = [table for table in tables if table.rows and table not in named]
+    return sheet_of(path, on_one_clock(path, named, wanted), others, wanted)
 
 
 def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTable]:

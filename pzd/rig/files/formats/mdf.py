@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from traceback import walk_tb
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -45,7 +46,11 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
             if plain:
                 clock = None if master is None else group.channels[master]
                 name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
-                found += tables_by_length(name, _columns(clock, plain))
+                columns = _columns(clock, plain)
+                read = tables_by_length(name, columns)
+                # Every master of time counts from the start of the file.
+                shared = next(iter(columns.values()))[1] == "s"
+                found += [replace(t, clock=next(iter(columns)), begins=0.0) for t in read] if shared else read
     return found
 
 
