@@ -21,12 +21,12 @@ from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, HeldOutTest, HeldOutVoltage, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
-from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.cli.output import Output, complain
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.parallel.processes import Progress
 from pzd.quantities import Control
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.runs import Run
 
 COMMANDS = [

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value
-from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
 from pzd.identification.config import GroupConfig, IdentifyConfig
@@ -17,6 +16,7 @@ from pzd.identification.stage import identify
 from pzd.pipeline.command import opened, preflight
 from pzd.quantities import Control
 from pzd.record import Record, merged_voltages
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.rig.config import FilesEntry, FileSplit
 from pzd.rig.files.reading import listed
 from pzd.schema.errors import ConfigError, DataError

@@ -13,7 +13,6 @@ import pytest
 from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
 
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
-from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.effect import declared_effect
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
@@ -24,6 +23,7 @@ from pzd.diagnosis.hypotheses.regression import residuals_of
 from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.schema.errors import ConfigError
 
 TESTS = ((0.5, 0.03), (1.0, 0.02), (1.0, 0.03), (2.0, 0.02))

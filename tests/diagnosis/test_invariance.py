@@ -12,7 +12,6 @@ from synthetic import TWO, all_but, coloured, damper_of, diagnosed, sines
 from test_naming import TRUTHS
 
 from pzd.artefacts import Diagnosed, ParameterRow, Value
-from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.compose import respond
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
@@ -20,6 +19,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.search.acceptance import misplaced_end_stop
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.rig.stand.frame import force_in_frame
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics

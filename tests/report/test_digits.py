@@ -7,7 +7,6 @@ import pytest
 
 from pzd.artefacts import Characteristics, Gap, Identified, ParameterRow
 from pzd.artefacts.identified import GasAndFrictionRow, PeakVelocityRow
-from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.verdict import hold_out_note
 from pzd.force_table.force import lost, not_monotone
@@ -15,6 +14,7 @@ from pzd.quantities import Control
 from pzd.report import tables
 from pzd.report.columns import PAGE, TERMINAL
 from pzd.report.damper_models import effect_in_words
+from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.schema.errors import supported
 from tests.test_cli import diagnosis
 
