@@ -5,6 +5,9 @@ Equation: F = k (x - y),  C dy/dt + T0 sign(dy/dt) = F      Source: Makowski and
 Eliminating y gives dF/dt = k dx/dt - (k/C) soft(F, T0), whose right-hand side is continuous. While the rod does not
 turn round, G = F sign(dx/dt) passes through slip against the motion, stick, and slip with it, in this order: `stick`
 and `slip` are their closed forms, and all that there is.
+
+The limits of the law are in it. With 1/k = 0 the damper is rigid, F = T0 sign(dx/dt) + C dx/dt, and holds any force up to
+T0 at rest; with C = 0 it is elasto-plastic; with T0 = 0 a Maxwell element.
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 
+STIFFEST = 1e13
+"""Stiffness of a rigid damper where a number is needed [N/m]: 1e8 N, more than any damper gives, bend it by 10 um."""
 _STRAIGHT = np.zeros(1)  # no velocities: the displacement is linear between samples
 _NO_SLOPES = np.empty((0, 3))
 _SMALL_Z = 1e-3  # below it the quotients are taken from their series: (e^z - 1)/z loses digits like 1/z
@@ -42,9 +47,9 @@ def element_force(
     ----------
     displacement : (n,) extension x [m]
     step : sampling interval [s], or (n - 1,) of them
-    friction : T0 [N]
-    damping : C [N s/m]
-    stiffness : k [N/m]
+    friction : T0 >= 0 [N]
+    damping : C >= 0 [N s/m]
+    stiffness : k > 0 [N/m], infinite for a rigid damper
     initial_force : F at the first sample [N]
     velocity : (n,) extension speed [m/s], whose change bends the displacement to a parabola inside each step;
         None: linear between samples
@@ -96,10 +101,11 @@ def element_force_sensitivities(
     velocity: Array | None = None,
     every: int = 1,
 ) -> tuple[Array, Array]:
-    """Compute the force of the Bingham element and its derivatives by T0, C and k at a fixed initial force.
+    """Compute the force of the Bingham element and its derivatives by T0, C and 1/k at a fixed initial force.
 
     Each piece of the closed form is differentiated at fixed duration; the field is continuous at
-    |F| = T0, so the moving switching times add nothing.
+    |F| = T0, so the moving switching times add nothing. By the compliance 1/k the derivative is finite in a rigid damper
+    too, where it is -C^2 d2x/dt2 but at the instant of a reversal.
 
     Parameters
     ----------
@@ -107,7 +113,7 @@ def element_force_sensitivities(
 
     Returns
     -------
-    (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m], or as many of them as are kept
+    (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/d(1/k) [N2/m], or as many of them as are kept
     """
     kept = displacement[::every].size
     force, slopes = np.empty(kept), np.empty((kept, 3))
@@ -117,7 +123,7 @@ def element_force_sensitivities(
 
 
 class Element(NamedTuple):
-    """T0 [N], C [N s/m] and k [N/m]."""
+    """T0 [N], C [N s/m] and k [N/m], infinite for a rigid damper."""
 
     T0: float
     C: float
@@ -133,6 +139,8 @@ class Relaxation(NamedTuple):
     """exp(-k time/C), the remaining share of the force [-]."""
     rise: float
     """1 - decay."""
+    mean: float
+    """Mean of the decay over the time, rise/|z| [-]; 0 where the force settles at once."""
     by_speed: float
     """Derivative of the force by the extension speed at the start [N s/m]."""
     by_change: float
@@ -143,17 +151,17 @@ class Relaxation(NamedTuple):
 def relaxation(time: float, C: float, k: float) -> Relaxation:
     """Compute the coefficients of the force after slip over a time step [s].
 
-    Equation: phi_1(z) = (e^z - 1)/z, phi_2(z) = (phi_1(z) - 1)/z at z = -k time/C
-    Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10)
+    Equation: by_speed = C (1 - e^z), by_change = C (1 - (e^z - 1)/z) at z = -k time/C; finite for k -> inf and C -> 0
+    Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10), phi_1 and phi_2 of z
     """
-    z = -k / C * time
+    z = -math.inf if C == 0.0 or math.isinf(k) else -k / C * time
     if z > -_SMALL_Z:
         second = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))
         first = 1.0 + z * second
-    else:
-        first = math.expm1(z) / z
-        second = (first - 1.0) / z
-    return Relaxation(time, 1.0 + z * first, -z * first, k * time * first, k * time * second)
+        return Relaxation(time, 1.0 + z * first, -z * first, first, k * time * first, k * time * second)
+    rise = -math.expm1(z)
+    first = -rise / z
+    return Relaxation(time, 1.0 - rise, rise, first, C * rise, C * (1.0 - first))
 
 
 @inlined
@@ -178,7 +186,8 @@ def stick(F: float, k: float, u0: float, u1: float, time: float) -> float:
 
     Equation: dF/dt = k u      Source: eq. (1), dy/dt = 0
     """
-    return F + k * (0.5 * (u0 + u1)) * time
+    travel = 0.5 * (u0 + u1) * time
+    return F if travel == 0.0 else F + k * travel  # a rigid damper at rest holds its force
 
 
 @compiled
@@ -273,6 +282,8 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
     element : T0, C, k
     """
     T0, C, k = element
+    if C == 0.0 or math.isinf(k):
+        return 0.0
     low, high = 0.0, left
     time = min(C / k * math.log1p(max(-T0 - G, 0.0) / (C * (0.5 * (u0 + u1)))), left)
     for _ in range(_NEWTON_STEPS):
@@ -294,6 +305,8 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
 @inlined
 def _until_risen(distance: float, u: float, bend: float) -> float:
     """Solve for the time [s] in which a speed u + bend t [m/s] covers a distance [m]: the smaller root."""
+    if distance <= 0.0:
+        return 0.0
     return 2.0 * distance / (u + math.sqrt(max(u * u + 2.0 * bend * distance, 0.0)))
 
 
@@ -301,10 +314,10 @@ def _until_risen(distance: float, u: float, bend: float) -> float:
 def _advance_slopes(
     slopes: Array, F: float, side: float, u0: float, u1: float, element: Element, over: Relaxation
 ) -> None:
-    """Advance the (3,) derivatives of the force by T0, C and k over one piece of fixed duration.
+    """Advance the (3,) derivatives of the force by T0, C and the compliance s = 1/k over one piece of fixed duration.
 
-    Equation: those of `slip` and `stick` differentiated, with g = dF/dt at the start and the extension speed's rate b:
-    d(dF/dk)/dt = u - w - (k/C) dF/dk, d(dF/dC)/dt = (k/C) (w - dF/dC), w = (F - T0 side)/C
+    Equation: those of `slip` and `stick` differentiated: d(dF/ds)/dt = -(k/C) dF/ds - k^2 (u - w),
+    d(dF/dC)/dt = (k/C) (w - dF/dC), w = (F - T0 side)/C; while it sticks, d(dF/ds)/dt = -k^2 u
 
     Parameters
     ----------
@@ -318,13 +331,16 @@ def _advance_slopes(
     T0, C, k = element
     if over.time <= 0.0:
         return
+    change = u1 - u0
     if side == 0.0:
-        slopes[0, 2] += stick(0.0, 1.0, u0, u1, over.time)
+        if not math.isinf(k):
+            slopes[0, 2] -= k * stick(0.0, k, u0, u1, over.time)
         return
     decay = over.decay
-    g = k * (u0 - (F - side * T0) / C)
-    by_stiffness = decay * over.time * g / k + (u1 - u0) * (over.rise * C / k - decay * over.time) * C / (k * over.time)
-    by_speeds = (over.by_speed * u0 + over.by_change * (u1 - u0)) / C
+    late, late_by_compliance = 0.0, 0.0
+    if decay > 0.0:  # never in a limit, where C or 1/k is zero
+        late = k / C * over.time * decay * (u0 - (F - side * T0) / C - C / k * change / over.time)
+        late_by_compliance = C * k * late
     slopes[0, 0] = decay * slopes[0, 0] + over.rise * side
-    slopes[0, 1] = decay * slopes[0, 1] + by_speeds - k / C * by_stiffness
-    slopes[0, 2] = decay * slopes[0, 2] + by_stiffness
+    slopes[0, 1] = decay * slopes[0, 1] + over.rise * u0 + (1.0 - 2.0 * over.mean) * change - late
+    slopes[0, 2] = decay * slopes[0, 2] - late_by_compliance - C * C * over.rise * change / over.time

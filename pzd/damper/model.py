@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,9 +19,9 @@ EffectValues = Mapping[str, float | tuple[float, ...]]
 Effects = dict[str, dict[str, float | tuple[float, ...]]]
 """Parameters of each effect, by its name and theirs."""
 
-PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (1e-4, 1e9), "k_N_per_m": (1.0, 1e13)}
-"""Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge, wide enough for an
-element that hardly damps or hardly yields. A value outside is in another unit."""
+PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (0.0, 1e9), "k_N_per_m": (1.0, math.inf)}
+"""Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge; no friction, no
+damping and a rigid oil spring are limits of the law. A value outside is in another unit."""
 
 
 class BaseRow(Frozen):
@@ -32,10 +33,16 @@ class BaseRow(Frozen):
     """Temperature; empty where none was recorded."""
     T0_N: float = Field(ge=0.0)
     """Dry friction force."""
-    C_Ns_per_m: float = Field(gt=0.0)
+    C_Ns_per_m: float = Field(ge=0.0)
     """Damping coefficient."""
-    k_N_per_m: float = Field(gt=0.0)
-    """Stiffness of the oil spring."""
+    k_N_per_m: float = Field(default=math.inf, gt=0.0, allow_inf_nan=True)
+    """Stiffness of the oil spring; empty or `.inf` for a rigid damper."""
+
+    @field_validator("k_N_per_m", mode="before")
+    @classmethod
+    def _rigid(cls, value: float | None) -> float:
+        """Take an empty cell, as JSON writes an infinite number, for a rigid damper."""
+        return math.inf if value is None else value
 
     @field_validator(*PHYSICAL)
     @classmethod
@@ -52,7 +59,8 @@ def unphysical(name: str, value: float) -> str | None:
     if low <= value <= high:
         return None
     unit = name.partition("_")[2].replace("_per_", "/").replace("Ns", "N s")
-    return f"must lie between {low:g} and {high:g} {unit}, as that of every damper does; is it in another unit?"
+    limits = f"be at least {low:g} {unit}" if math.isinf(high) else f"lie between {low:g} and {high:g} {unit}"
+    return f"must {limits}, as that of every damper does; is it in another unit?"
 
 
 class Damper(Frozen):

@@ -27,6 +27,7 @@ from pzd.damper.compiled.columns import (
 from pzd.damper.compiled.kernels import T0, C, K, Row, follow_voltage, interpolate, row_of
 from pzd.damper.confounders import module_of
 from pzd.damper.effect import NODE_VOLTAGES, arguments, functions
+from pzd.damper.element import STIFFEST
 from pzd.damper.model import BaseRow, Damper
 from pzd.record import Array
 
@@ -128,12 +129,16 @@ def _over_temperature(rows: Sequence[BaseRow], temperature: Array | float | None
         raise ValueError("the damper depends on the temperature, and none is given")
     nodes = np.array([row.temperature_degC or 0.0 for row in rows])
     columns = np.array([(row.T0_N, row.C_Ns_per_m, row.k_N_per_m) for row in rows])
+    if len(rows) > 1:
+        columns = np.minimum(columns, (np.inf, np.inf, STIFFEST))
     wanted = np.atleast_1d(nodes[0] if temperature is None else temperature)
     return np.stack([np.interp(wanted, nodes, column) for column in columns.T], axis=-1)
 
 
 def _over_voltage(nodes: Array, at_nodes: Array, voltage: Array) -> Array:
     """Interpolate over the first axis of (m, n or 1, 3) values at (m,) nodes."""
+    if nodes.size > 1:
+        at_nodes = np.minimum(at_nodes, (np.inf, np.inf, STIFFEST))  # between two infinite ones nothing is linear
     if nodes.size == 1:
         return np.broadcast_to(at_nodes[0], (max(voltage.size, at_nodes.shape[1]), 3))
     if at_nodes.shape[1] == 1:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pzd.compiled import compiled, inlined
 from pzd.damper import regimes
 from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, nudged, row_of, stroke_law, stroke_slope
-from pzd.damper.element import relaxation
+from pzd.damper.element import STIFFEST, relaxation
 from pzd.damper.flow import breakaway, relief, relief_slope, smooth_force, smooth_slope, smooth_speed
 from pzd.damper.regimes import RELIEF, SMOOTH, STICK, UNSOLVED, TimeStep, extension_speed, row_in, spring_force
 from pzd.record import Array
@@ -36,7 +36,8 @@ class Variables(NamedTuple):
     columns: NDArray[np.int64]
     """(c,) columns of the parameter row."""
     along: Array
-    """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples."""
+    """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples; for k those of the
+    compliance 1/k, which are finite in a rigid damper too."""
     initial_slopes: Array
     """(v,) derivatives of the initial force by each variable [N]."""
 
@@ -110,14 +111,27 @@ def march_sensitivities(
     (n,) force [N] and (n, v) its derivatives [N]
     """
     force, slopes = np.empty(displacement.size), np.empty((displacement.size, variables.initial_slopes.size))
+    rows = _off_the_limits(rows)
     v, state, initial_slopes = sensitivities_to(variables, rows), np.zeros(STATES), variables.initial_slopes
     _march(displacement, velocity, steps, rows, initial_force, initial_slopes, tolerance, state, force, v, slopes)
     return force, slopes
 
 
+LEAST_DAMPING = 1e-4
+"""Least C on its path [N s/m], and least C v at 1 m/s as a share of T0: the flow curve has to rise, to be inverted."""
+
+
+def _off_the_limits(rows: Array) -> Array:
+    """Return (n, r) rows in which a rigid damper is hardly elastic, and one without damping hardly damps."""
+    moved = rows.copy()
+    moved[:, K] = np.minimum(rows[:, K], STIFFEST)
+    moved[:, C] = np.maximum(rows[:, C], LEAST_DAMPING * np.maximum(rows[:, T0], 1.0))
+    return moved
+
+
 def deflections(force: Array, rows: Array) -> Array:
     """Compute the (n,) elastic deflections [m] of an element that carries (n,) forces [N], by (n, r) or (1, r) rows."""
-    found = np.empty(force.size)
+    rows, found = _off_the_limits(rows), np.empty(force.size)
     _fill_deflections(force, rows, found)
     return found
 
@@ -325,6 +339,7 @@ def sensitivities_to(variables: Variables, rows: Array) -> Sensitivities:
     samples, count = along.shape[:2]
     own, some = np.abs(rows[0, columns]), along[:: max(samples // _SAMPLES_FOR_NUDGES, 1)]
     largest = np.maximum(np.max(np.abs(some), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
+    largest = np.where(columns == K, own, largest)  # its variable is 1/k
     nudges = _NUDGE * np.where(largest > 0.0, largest, 1.0)
     ends = np.zeros((2, 1 + count))
     place = np.full(2, np.nan)
@@ -374,6 +389,8 @@ def _force_derivative(v: Sensitivities, e: float, p: Row) -> float:
         by = v.nudges[c]
         moves = K <= v.columns[c] < FLOW
         v.partial[c] = (spring_force(e, nudged(p, v.columns[c], by)) - force) / by if moves else 0.0
+        if v.columns[c] == K:
+            v.partial[c] *= -p[K] * p[K]  # by 1/k
     return p[K] * stroke_slope(e, side, p) if force != 0.0 else 0.0
 
 
@@ -395,6 +412,8 @@ def _w_derivatives(
         else:
             change = curve - _curve(w, q, regime, side)
         v.partial[c] = -side * change / (rise * v.nudges[c])
+        if v.columns[c] == K:
+            v.partial[c] *= -p[K] * p[K]  # by 1/k
     for j in range(v.deflection.size):
         found[1 + j] = _by_variable(v, j, sample, share)
 

@@ -69,12 +69,14 @@ def test_agrees_with_an_event_restarted_high_order_solver_to_1e_9(rng: np.random
 def test_sensitivities_are_the_limit_of_central_differences(rng: np.random.Generator, column: int, bent: bool) -> None:
     x, values = multisine(rng), np.array([400.0, 2500.0, 4e5])
     velocity = np.gradient(x, STEP) if bent else None
-    step = np.zeros(3)
-    step[column] = 1e-6 * values[column]
-    ahead, behind = (element_force(x, STEP, *(values + s), 0.0, velocity) for s in (step, -step))
-    difference = ahead - behind
+    size = 1.0 / values[2] if column == 2 else values[column]  # the third is by 1/k
+    ahead, behind = values.copy(), values.copy()
+    ahead[column], behind[column] = values[column] * (1.0 + 1e-6), values[column] * (1.0 - 1e-6)
+    if column == 2:
+        ahead[2], behind[2] = 1.0 / (size * (1.0 + 1e-6)), 1.0 / (size * (1.0 - 1e-6))
+    difference = element_force(x, STEP, *ahead, 0.0, velocity) - element_force(x, STEP, *behind, 0.0, velocity)
     _, slopes = element_force_sensitivities(x, STEP, *values, 0.0, velocity)
-    expected = difference / (2 * step[column])
+    expected = difference / (2e-6 * size)
     assert np.max(np.abs(slopes[:, column] - expected)) <= 1e-6 * np.max(np.abs(expected))
 
 
@@ -154,3 +156,86 @@ def test_every_nth_force_is_that_of_the_whole_path(rng: np.random.Generator, eve
     assert np.array_equal(kept, force[::every])
     assert np.array_equal(kept_slopes, slopes[::every])
     assert np.array_equal(element_force(*given, every=every), force[::every])
+
+
+# --- The limits of the law ---
+
+
+def smooth_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A few sines of random phase and their speed, and the speed at the end of each step as the element takes it."""
+    time, phases = np.arange(3000) * STEP, rng.uniform(0, 2 * np.pi, 2)
+    tones = [(0.02, 2 * np.pi * 1.1, phases[0]), (0.004, 2 * np.pi * 4.3, phases[1])]
+    x = np.sum([a * np.sin(w * time + p) for a, w, p in tones], axis=0)
+    v = np.sum([a * w * np.cos(w * time + p) for a, w, p in tones], axis=0)
+    return x, v, np.diff(x) / STEP + 0.5 * np.diff(v)
+
+
+def test_a_rigid_damper_is_friction_and_a_viscous_force_of_the_rod(rng: np.random.Generator) -> None:
+    for _ in range(3):
+        x, v, speed = smooth_motion(rng)
+        T0, C = rng.uniform(0, 1000), rng.uniform(0, 5000)
+        force = element_force(x, STEP, T0, C, np.inf, 0.0, v)
+        np.testing.assert_allclose(force[1:], T0 * np.sign(speed) + C * speed, rtol=1e-12, atol=1e-9)
+
+
+def test_a_rigid_damper_holds_any_force_up_to_friction_at_rest() -> None:
+    x = np.array([0.0, 0.0, 0.0, 0.002, 0.002, 0.002])
+    for begun in (-300.0, -20.0, 0.0, 299.0):
+        force = element_force(x, STEP, 300.0, 50.0, np.inf, begun)
+        np.testing.assert_allclose(force, [begun, begun, begun, 400.0, 300.0, 300.0])
+
+
+def test_a_rigid_damper_turns_with_the_rod_inside_a_step() -> None:
+    """The speed goes from -0.6 to 0.4 m/s: at the end of the step the force is that of the way back."""
+    x, v = np.array([0.0, -0.1 * STEP]), np.array([-0.6, 0.4])
+    assert element_force(x, STEP, 300.0, 1000.0, np.inf, -900.0, v)[1] == pytest.approx(300.0 + 400.0, rel=1e-12)
+
+
+def test_without_damping_the_element_is_elasto_plastic(rng: np.random.Generator) -> None:
+    """F goes with k dx and is cut off at T0, sample by sample, between reversals."""
+    x = np.cumsum(np.repeat(rng.choice([-1.0, 1.0], 30), 20)) * 1e-4
+    force, expected = element_force(x, STEP, 300.0, 0.0, 2e5), [0.0]
+    for dx in np.diff(x):
+        expected.append(float(np.clip(expected[-1] + 2e5 * dx, -300.0, 300.0)))
+    np.testing.assert_allclose(force, expected, atol=1e-9)
+
+
+def test_rigid_and_without_damping_it_is_dry_friction(rng: np.random.Generator) -> None:
+    x, v, speed = smooth_motion(rng)
+    force = element_force(x, STEP, 250.0, 0.0, np.inf, 0.0, v)
+    np.testing.assert_allclose(force[1:], 250.0 * np.sign(speed))
+
+
+def test_a_stiff_damper_goes_to_the_rigid_one_linearly_in_the_compliance(rng: np.random.Generator) -> None:
+    """But for the reversals, F(1/k) - F(0) is 1/k times the sensitivity of the rigid damper, -C^2 d2x/dt2."""
+    x, v, speed = smooth_motion(rng)
+    rigid, slopes = element_force_sensitivities(x, STEP, 300.0, 1500.0, np.inf, 0.0, v)
+    np.testing.assert_allclose(slopes[1:, 2], -(1500.0**2) * np.diff(v) / STEP, rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(slopes[1:, 0], np.sign(speed))
+    np.testing.assert_allclose(slopes[1:, 1], speed, rtol=1e-9, atol=1e-12)
+    for k in (1e7, 1e8, 1e9):
+        away = element_force(x, STEP, 300.0, 1500.0, k, 0.0, v) - rigid
+        assert np.median(np.abs(away - slopes[:, 2] / k)) < 1e-3 * np.median(np.abs(away))
+
+
+def test_a_damper_without_damping_is_the_limit_of_those_that_hardly_damp(rng: np.random.Generator) -> None:
+    x, v, speed = smooth_motion(rng)
+    limit, slopes = element_force_sensitivities(x, STEP, 300.0, 0.0, 2e5, 0.0, v)
+    away = [np.max(np.abs(element_force(x, STEP, 300.0, C, 2e5, 0.0, v) - limit)) for C in (1.0, 0.1, 0.01)]
+    np.testing.assert_allclose(np.array(away), away[0] * np.array([1.0, 0.1, 0.01]), rtol=0.05)
+    flowing = np.abs(limit[1:]) == 300.0
+    np.testing.assert_allclose(slopes[1:, 1][flowing], speed[flowing], rtol=1e-9)
+    assert np.all(np.isfinite(slopes))
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e8, 1e12, np.inf])
+@pytest.mark.parametrize("damping", [0.0, 1e-3, 1.0, 1e4, 1e7])
+@pytest.mark.parametrize("friction", [0.0, 1e-3, 300.0])
+def test_force_and_sensitivities_are_finite_everywhere(
+    rng: np.random.Generator, friction: float, damping: float, stiffness: float
+) -> None:
+    x = np.concatenate([np.zeros(5), multisine(rng, 300), np.full(5, 0.01)])
+    for velocity in (None, np.gradient(x, STEP)):
+        force, slopes = element_force_sensitivities(x, STEP, friction, damping, stiffness, 0.0, velocity)
+        assert np.all(np.isfinite(force))
+        assert np.all(np.isfinite(slopes))

@@ -49,9 +49,15 @@ class KernelInputs:
         return parameter_rows.rows_along(self.nodes, at_nodes, self.effective_voltage)
 
     def difference_to(self, other: KernelInputs) -> Array:
-        """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
-        same_voltage = self.effective_voltage is other.effective_voltage
+        """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite; for k, of 1/k.
+
+        Linear between nodes is k, so that along a voltage the difference of 1/k is formed where it is needed.
+        """
+        same_voltage = self.effective_voltage is other.effective_voltage and np.array_equal(
+            self.at_nodes[:, parameter_rows.K], other.at_nodes[:, parameter_rows.K]
+        )
         mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
+        mine, others = _with_compliance(mine), _with_compliance(others)
         shape = np.broadcast_shapes(mine.shape, others.shape)
         return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
@@ -64,6 +70,13 @@ class KernelInputs:
         if self.parallel is None:
             return np.zeros(1)
         return parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
+
+
+def _with_compliance(rows: Array) -> Array:
+    """Return (n, r) rows with 1/k in the place of k."""
+    moved = rows.copy()
+    moved[:, parameter_rows.K] = 1.0 / rows[:, parameter_rows.K]
+    return moved
 
 
 def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
@@ -108,7 +121,7 @@ class SearchDirections:
     changed: NDArray[np.int64]
     """(c,) columns of the rows that a direction changes."""
     derivatives: Array
-    """(1, d, c) or (m, d, c) derivatives of these columns by each direction."""
+    """(1, d, c) or (m, d, c) derivatives of these columns by each direction, for k those of 1/k."""
 
 
 def search_directions(

@@ -1,0 +1,374 @@
+"""When nothing is missing, does pzd say so? `make plain-study`: plain Bingham dampers from everywhere.
+
+    python tests/studies/plain_study.py [--cases 600] [--seed 20261126] [--jobs 2] [--list]
+
+Each case is a damper of one to five levels of the control signal, drawn by Sobol points: friction alone to viscous
+alone, rigid to a fifth of the stroke; measured by one to six tests a level, at 100 Hz to 5 kHz, with noise of 0.02 to
+3 % of peak, noise, resolution and zero of the displacement, gains, offsets and delays of the tests. The records are
+made by the integrator of the second generator (`pzd.blind.independent`). The stages rig, identify and diagnose then say
+what they make of it. Printed are the verdicts, where they come from, and how often intervals hold the truth; `--list`
+prints every case that was not judged right, with why.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+
+import pzd.cli  # noqa: F401  # before numpy: as in the command, the linear algebra has one thread
+import numpy as np
+from numpy.random import Generator, SeedSequence, default_rng
+from scipy.stats import qmc
+
+from pzd.artefacts import ParameterRow, Rig
+from pzd.blind.independent import stand
+from pzd.blind.independent.kernel import plain_force
+from pzd.blind.independent.stand import Actuator, Driven, LaboratoryCampaign, LaboratoryTest, MotionKind
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.stage import diagnose
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.quantities import Control
+from pzd.record import Array, Record
+from pzd.rig.config import FilesEntry, RigConfig
+from pzd.rig.preflight import PreflightRecord, examined
+from pzd.schema.errors import DataError
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
+from pzd.signals.nuisance import NuisanceConfig
+
+SEED = 20261126
+CASES = 600
+KINDS: tuple[MotionKind, ...] = ("sine", "sine", "sine", "triangle", "sweep", "two_tone", "random")
+"""Motions of the tests; every second one of a rig is a sine."""
+RATES = (100.0, 128.0, 200.0, 256.0, 500.0, 512.0, 1000.0, 1024.0, 2000.0, 2048.0, 4000.0, 5000.0)
+MOST_SAMPLES = 25_000
+"""In all tests of a case, so that one takes seconds; what is beyond is not run."""
+SAMPLES_A_CYCLE = 40.0
+"""Least number: fewer are refused."""
+LIMIT_SHARE = 0.12
+"""Share of the cases at either end of an axis that ends in a limit."""
+STIFFEST, SOFTEST = 1e-6, 0.2
+"""T0/k over the stroke."""
+QUICKEST, SLOWEST = 1e-6, 0.05
+"""C/k [s]."""
+COARSEST = 0.01
+"""Largest resolution of the displacement, as a share of the stroke."""
+COLUMNS = ("T0_N", "C_Ns_per_m", "k_N_per_m")
+
+
+# --- A case: a plain damper, its tests, its sensors ---
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A plain damper at every level of the control signal, its tests, and what its sensors do."""
+
+    number: int
+    dampers: tuple[Bingham, ...]
+    """At every level; a rigid oil spring is infinite."""
+    campaign: LaboratoryCampaign
+    noise: float
+    """Of the force, r.m.s. as a share of the peak of the rig."""
+    correlation: float
+    """Of that noise, from sample to sample."""
+    displacement_noise: float
+    """[m]"""
+    displacement_step: float
+    """[m]; 0 where there is none."""
+
+    @property
+    def regions(self) -> Iterator[str]:
+        """Yield the regions that it counts in."""
+        friction, damping, stiffness = self.dampers[0]
+        yield "rigid" if np.isinf(stiffness) else "elastic"
+        yield "friction alone" if damping == 0.0 else "viscous alone" if friction == 0.0 else "friction and viscous"
+        yield "noise to 0.3 %" if self.noise <= 0.003 else "noise to 1 %" if self.noise <= 0.01 else "noise above 1 %"
+        fine = self.displacement_step <= 5e-6
+        yield "no steps in x" if self.displacement_step == 0.0 else "x to 5 um" if fine else "x above 5 um"
+        yield "to 256 Hz" if self.campaign.rate <= 256.0 else "above 256 Hz"
+        yield "periodic tests" if all(t.kind in ("sine", "triangle") for t in self.campaign.tests) else "other motions"
+        yield "one test" if len(self.campaign.tests) == 1 else "several tests"
+
+    def __str__(self) -> str:
+        dampers = "; ".join(f"T0 {d.friction:.4g} C {d.damping:.4g} k {d.stiffness:.4g}" for d in self.dampers)
+        tests = ", ".join(f"{t.kind} {t.frequency:.3g} Hz {1e3 * t.amplitude:.3g} mm" for t in self.campaign.tests)
+        return (
+            f"{dampers} | {self.campaign.rate:g} Hz, noise {100 * self.noise:.2g} % rho {self.correlation:.2f}, x noise "
+            f"{1e6 * self.displacement_noise:.2g} um step {1e6 * self.displacement_step:.3g} um | {tests}"
+        )
+
+
+def log_between(share: float, low: float, high: float) -> float:
+    """Return a number at a share of the way on a logarithmic scale."""
+    return float(low * (high / low) ** share)
+
+
+def with_ends(share: float) -> float:
+    """Return a share whose ends 0 and 1 have a weight of their own."""
+    return float(np.clip((share - LIMIT_SHARE) / (1.0 - 2.0 * LIMIT_SHARE), 0.0, 1.0))
+
+
+def drawn(seed: int, count: int) -> list[Case]:
+    """Draw the cases."""
+    points = qmc.Sobol(16, seed=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    return [case(i, point.tolist(), default_rng(SeedSequence(seed, spawn_key=(i,)))) for i, point in enumerate(points)]
+
+
+def case(number: int, u: Sequence[float], rng: Generator) -> Case:
+    """Draw one case from a point of the unit cube; what is left goes by chance."""
+    levels, each = 1 + int(5.0 * u[0] ** 1.5), 1 + int(6.0 * u[1])
+    amplitude, rate = log_between(u[2], 0.005, 0.05), RATES[int(len(RATES) * u[3])]
+    least = max(0.2, 6.0 * levels * rate / MOST_SAMPLES)
+    slowest = log_between(u[4], least, max(least, min(2.0, rate / SAMPLES_A_CYCLE / 1.5)))
+    values = tuple(float(v) for v in np.linspace(0.0, 10.0, levels)) if levels > 1 else (0.0,)
+    tests = _tests(rng, each, amplitude, slowest, rate, values)
+    speed = max(2.0 * np.pi * t.frequency * t.amplitude for t in tests)
+    peak, share = log_between(u[5], 50.0, 2e4), with_ends(u[6])
+    friction, damping = share * peak, (1.0 - share) * peak / speed
+    stiffness = _stiffness(friction, damping, amplitude, u[7], u[14] < 0.5, u[8])
+    gain, growth = 1.0 + 3.0 * u[9], rng.uniform(-0.2, 0.5, 2)
+    courses = np.linspace(0.0, 1.0, levels)
+    return Case(
+        number,
+        tuple(
+            Bingham(
+                friction * (1.0 + (gain - 1.0) * s), damping * (1.0 + growth[0] * s), stiffness * (1.0 + growth[1] * s)
+            )
+            for s in courses
+        ),
+        LaboratoryCampaign(tuple(tests), values, rate),
+        log_between(u[10], 2e-4, 0.03),
+        0.9 * u[11],
+        0.0 if u[12] < 0.2 else log_between((u[12] - 0.2) / 0.8, 2e-7, 2e-5),
+        0.0 if u[13] < 0.6 else min(log_between((u[13] - 0.6) / 0.4, 1e-6, 2e-4), 2.0 * COARSEST * amplitude),
+    )
+
+
+def _tests(
+    rng: Generator, each: int, amplitude: float, slowest: float, rate: float, values: Sequence[float]
+) -> list[LaboratoryTest]:
+    """Plan the tests, the same at every level, as many as the samples allow."""
+    fastest = rate / SAMPLES_A_CYCLE
+    tests: list[LaboratoryTest] = []
+    for i in range(each):
+        kind = "sine" if i % 2 == 0 else KINDS[int(rng.integers(len(KINDS)))]
+        frequency = float(np.clip(slowest * log_between(rng.random(), 1.0, 6.0), slowest, fastest))
+        frequency = frequency if kind in ("sine", "triangle") else min(frequency, fastest / 3.0)
+        size = amplitude * float(rng.uniform(0.4, 1.0)) * min(1.0, (2.0 / frequency) ** 0.7)
+        length = int(rng.integers(4, 9)) if kind not in ("sweep", "random") else int(rng.integers(8, 16))
+        frequency = frequency if kind != "sweep" else max(frequency, 1.0)
+        tests.append(LaboratoryTest(kind, size, frequency, length))
+    every = [replace(t, value=value) for t in tests for value in values]
+    samples = np.cumsum([t.seconds * rate for t in every])
+    fits = int(np.searchsorted(samples, MOST_SAMPLES))
+    return every[: max(len(values) * (fits // len(values)), len(values))]
+
+
+def _stiffness(
+    friction: float, damping: float, amplitude: float, rigid: float, by_friction: bool, share: float
+) -> float:
+    """Return k by T0/k over the stroke or by C/k, neither beyond what a damper has."""
+    if rigid < LIMIT_SHARE:
+        return np.inf
+    stroke = 2.0 * amplitude
+    softest = max(friction / (stroke * SOFTEST), damping / SLOWEST)
+    wanted = (
+        friction / (stroke * log_between(share, STIFFEST, SOFTEST))
+        if by_friction and friction > 0.0 or damping == 0.0
+        else damping / log_between(share, QUICKEST, SLOWEST)
+    )
+    return float(max(wanted, softest))
+
+
+# --- Its records ---
+
+
+def rig_of(case_: Case, seed: int) -> Rig:
+    """Return the records of a case as the rig stage hands them on."""
+    rng = default_rng(SeedSequence(seed, spawn_key=(case_.number, 1)))
+    actuator, nuisance = Actuator.drawn(rng), NuisanceConfig()
+    motions = [stand.driven(case_.campaign, t, actuator, rng) for t in case_.campaign.tests]
+    forces = [_force(case_, m) for m in motions]
+    peak = max(float(np.max(np.abs(f))) for f in forces)
+    zero = float(rng.normal(0.0, 0.01))
+    records = []
+    for i, (motion, force) in enumerate(zip(motions, forces, strict=True)):
+        at = motion.recorded
+        instants, own = motion.time[at], float(np.max(np.abs(force)))
+        gain, offset, delay = np.clip(rng.standard_normal(3), -2.5, 2.5)
+        late = np.interp(instants - nuisance.delay_s * delay, motion.time[::2], force)
+        reading = (1.0 + nuisance.gain * gain) * late + nuisance.offset * offset * own
+        reading = reading + case_.noise * peak * _coloured(rng, at.size, case_.correlation)
+        x = motion.displacement[at] + zero + case_.displacement_noise * rng.standard_normal(at.size)
+        if case_.displacement_step > 0.0:
+            x = np.round(x / case_.displacement_step) * case_.displacement_step
+        voltage = np.full(at.size, motion.test.value) if len(case_.dampers) > 1 else None
+        records.append(_record(f"t{i:02d}-{motion.test.kind}", instants, x, reading, voltage))
+    return examined([lambda made=made: made for made in records], 1)  # type: ignore[misc]  # a default binds made
+
+
+def _force(case_: Case, motion: Driven) -> Array:
+    """Return the force at every second instant of the fine grid [N]."""
+    damper = case_.dampers[case_.campaign.values.index(motion.test.value)]
+    return plain_force(motion.time, motion.displacement, damper.friction, damper.damping, 1.0 / damper.stiffness)
+
+
+def _coloured(rng: Generator, count: int, correlation: float) -> Array:
+    """Draw (n,) noise of unit variance, e_i = rho e_(i-1) + w_i."""
+    from scipy.signal import lfilter
+
+    white = rng.standard_normal(count + 200)
+    return np.asarray(np.sqrt(1.0 - correlation**2) * lfilter([1.0], [1.0, -correlation], white)[200:])
+
+
+def _record(name: str, instants: Array, x: Array, force: Array, voltage: Array | None) -> PreflightRecord:
+    run = cycles(instants, x)
+    clean = kinematics(instants, x, run)
+    record = Record(name, None, instants, x, clean.velocity, clean.acceleration, force, voltage)
+    return PreflightRecord(record, run, clean, RigConfig(files=(FilesEntry(path="*.csv"),)).limits)
+
+
+# --- What the stages say ---
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What pzd says of a case."""
+
+    case: Case
+    verdict: str
+    """Of diagnose; `refused` with the reason."""
+    effects: tuple[str, ...]
+    reason: str
+    rows: tuple[ParameterRow, ...]
+    seconds: float
+
+    @property
+    def kind(self) -> str:
+        """Return how it counts."""
+        if self.effects:
+            return "adopted"
+        return "none" if self.verdict == "none" else self.verdict
+
+
+def judged(case_: Case, seed: int) -> Outcome:
+    """Identify and diagnose a case."""
+    begin = time.perf_counter()
+    rows: tuple[ParameterRow, ...] = ()
+    try:
+        rig = rig_of(case_, seed)
+        settings, config = IdentifyConfig(), RigConfig(files=(FilesEntry(path="*.csv"),))
+        identified = identify(settings, rig, 1)
+        rows = identified.rows
+        found = diagnose(DiagnoseConfig(), settings, config, rig, identified, Control(), None, 1).diagnosis
+        said = found.verdict, tuple(found.effects), found.reason
+    except DataError as error:
+        said = "refused", (), str(error)
+    except Exception:  # noqa: BLE001  # a study goes on, and the case counts as failed
+        said = "failed", (), traceback.format_exc()
+    return Outcome(case_, *said, rows, time.perf_counter() - begin)
+
+
+def _judged(given: tuple[Case, int]) -> Outcome:
+    return judged(*given)
+
+
+# --- What is printed ---
+
+WANTED = {"none": 0.95, "adopted": 0.01, "unexplained": 0.01, "refused": 0.01}
+KINDS_OF_OUTCOME = ("none", "adopted", "ambiguous", "unexplained", "refused", "failed")
+
+
+def table(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield the counts by region."""
+    yield f"{'':<22} cases " + " ".join(f"{kind:>12}" for kind in KINDS_OF_OUTCOME)
+    regions: dict[str, list[Outcome]] = {"all": list(outcomes)}
+    for outcome in outcomes:
+        for region in outcome.case.regions:
+            regions.setdefault(region, []).append(outcome)
+    for region, mine in regions.items():
+        counts = [sum(o.kind == kind for o in mine) for kind in KINDS_OF_OUTCOME]
+        shares = " ".join(f"{n:4d} {100.0 * n / len(mine):5.1f} %" for n in counts)
+        yield f"{region:<22} {len(mine):5d} {shares}"
+
+
+def coverage(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield how often intervals of T0, C and k hold the truth, off the limits and at them."""
+    for place, wanted in (("off the limits", False), ("at the limits", True)):
+        for i, column in enumerate(COLUMNS):
+            held = [h for o in outcomes for h, at in _held(o, i, column) if at is wanted]
+            share = f"{100.0 * np.mean(held):5.1f} %" if held else "     -"
+            yield f"rows not weak, {place}: {column.partition('_')[0]:<2} inside its interval {share} of {len(held)}"
+    rows = [row for o in outcomes for row in o.rows]
+    for column in COLUMNS[:2]:
+        name = column.partition("_")[0]
+        empty, weak = sum(getattr(r, column) is None for r in rows), sum(name in _doubted(r) for r in rows)
+        yield f"rows: {name} empty {empty}, empty or weak {weak} of {len(rows)}"
+
+
+def _doubted(row: ParameterRow) -> str:
+    """Return the names of the parameters that the status doubts."""
+    heads = (clause.partition(":")[2].partition("(")[0] for clause in row.status.split(";"))
+    return " ".join(heads)
+
+
+def _held(outcome: Outcome, i: int, column: str) -> Iterator[tuple[bool, bool]]:
+    """Yield for each row that is sure of a parameter whether its interval holds the truth, and whether at a limit."""
+    for row in outcome.rows:
+        low, high = getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95")
+        if low is None or high is None or column.partition("_")[0] in _doubted(row):
+            continue
+        level = int(np.argmin(np.abs(np.array(outcome.case.campaign.values) - (row.voltage_V or 0.0))))
+        truth = outcome.case.dampers[level]
+        limit = truth.friction == 0.0 or truth.damping == 0.0 or bool(np.isinf(truth.stiffness))
+        yield bool(low <= truth[i] <= high), limit
+
+
+def listed(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield every case that was not judged right, with why."""
+    for o in outcomes:
+        if o.kind != "none":
+            yield f"\n#{o.case.number} {o.kind} {o.effects} ({o.seconds:.1f} s) {o.case}\n    {o.reason}"
+            for row in o.rows:
+                T0, C, k = (getattr(row, column) for column in COLUMNS)
+                yield f"    identify: T0 {T0} C {C} k {k} W_s {row.W_s:.3g} {row.status}"
+
+
+def outcomes_of(cases: Sequence[Case], seed: int, jobs: int, heard: Callable[[Outcome], None]) -> list[Outcome]:
+    """Judge the cases, several at the same time."""
+    found = []
+    with ProcessPoolExecutor(jobs) as pool:
+        for outcome in pool.map(_judged, [(c, seed) for c in cases]):
+            heard(outcome)
+            found.append(outcome)
+    return found
+
+
+def main() -> None:
+    """Judge and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=CASES)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", type=int, nargs="*", help="numbers of the cases to judge")
+    parser.add_argument("--list", action="store_true", help="print the cases that were not judged right")
+    asked = parser.parse_args()
+
+    def heard(outcome: Outcome) -> None:
+        sys.stderr.write(f"{outcome.case.number}: {outcome.kind} ({outcome.seconds:.1f} s)\n")
+
+    cases = [c for c in drawn(asked.seed, asked.cases) if not asked.only or c.number in asked.only]
+    outcomes = outcomes_of(cases, asked.seed, asked.jobs, heard)
+    lines = [*table(outcomes), "", *coverage(outcomes), *(listed(outcomes) if asked.list else ())]
+    sys.stdout.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
