@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -206,11 +207,12 @@ class ParameterRow(ConditionRow):
     T0_N: float | None = Field(ge=0.0)
     T0_N_low95: float | None
     T0_N_high95: float | None
-    C_Ns_per_m: float | None = Field(gt=0.0)
+    C_Ns_per_m: float | None = Field(ge=0.0)
     C_Ns_per_m_low95: float | None
     C_Ns_per_m_high95: float | None
     k_N_per_m: float | None = Field(gt=0.0)
     k_N_per_m_low95: float | None
+    """Without a value: the stiffness from which on the tests do not tell k from a rigid damper's."""
     k_N_per_m_high95: float | None
     W_s: float = Field(ge=0.0)
     """Criterion (4) over the samples that the row was fitted to, less the forces of `auxiliary.csv` where there are."""
@@ -327,7 +329,8 @@ def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     """Return the baseline of one setting: the damper with its identified parameters and no effect.
 
     A value that the data do not determine is taken from the nearest condition that has it
-    (by voltage, then temperature); where no condition has it, from `FALLBACK`.
+    (by voltage, then temperature); where no condition has it, from `FALLBACK`. A k that has a lower bound alone is not
+    below it.
 
     Raises
     ------
@@ -351,8 +354,8 @@ def identified_damper(found: Identified, setting: str | None) -> Damper:
     return base_of(found.rows, setting)
 
 
-FALLBACK = {"T0_N": 0.0, "C_Ns_per_m": 1.0, "k_N_per_m": 1e8}
-"""Values where no condition determines a parameter: no friction, hardly any damping, a rigid spring."""
+FALLBACK = {"T0_N": 0.0, "C_Ns_per_m": 0.0, "k_N_per_m": math.inf}
+"""Values where no condition determines a parameter: no friction, no damping, a rigid oil spring."""
 
 
 def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
@@ -364,7 +367,8 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
 
     def value(name: str) -> float:
         known = [(distance(other), float(getattr(other, name))) for other in rows if getattr(other, name) is not None]
-        return min(known)[1] if known else FALLBACK[name]
+        bound = getattr(row, f"{name}_low95") if getattr(row, name) is None else None
+        return max(min(known)[1], bound or 0.0) if known else FALLBACK[name]
 
     return BaseRow(
         voltage_V=row.voltage_V, temperature_degC=row.temperature_degC, **{name: value(name) for name in FALLBACK}

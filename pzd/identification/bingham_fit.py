@@ -2,7 +2,8 @@
 
 Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
 
-The separable method starts from the characteristic and from a coarse grid. Scaling T0 and C with k scales the force,
+The separable method starts from the characteristic, from a coarse grid and from the rigid damper, which is linear in T0
+and C. Scaling T0 and C with k scales the force,
 F = k f(T0/k, C/k), so the stiffness follows linearly and the grid covers delta = T0/k and tau = C/k only. The
 evolutionary method stands for the paper's genetic algorithm. Both end in least squares with exact sensitivities.
 """
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.element import element_force, element_force_sensitivities
+from pzd.fit.element_coordinates import LARGEST, ElementCoordinates
 from pzd.identification.config import EvolutionaryConfig
 from pzd.identification.prepared_record import PreparedRecord
 from pzd.record import Array
@@ -26,12 +28,13 @@ from pzd.record import Array
 
 LARGEST_PRE_SLIP = 0.45
 """Largest pre-slip deflection T0/k of the search, as a share of the range of displacement: the element still slips."""
-AT_BOUND = 1e-3
-"""A parameter within this share of a bound, in search coordinates, lies at it."""
+AT_LIMIT = 1e-6
+"""A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much of
+what no test shows."""
 
 
 class Bingham(NamedTuple):
-    """Friction T0 [N], damping C [N s/m] and stiffness k [N/m] of the element, or one number for each of them."""
+    """Friction T0 [N], damping C [N s/m] and stiffness k [N/m] of the element, infinite for a rigid one."""
 
     friction: float
     damping: float
@@ -72,15 +75,15 @@ class Objective:
 
     def residuals(self, parameters: Bingham) -> Array:
         """Compute the measured less simulated force (N,), the forces beside the element profiled out [N]."""
-        return self._projected(self.measured - self.simulated(parameters))
+        return self.projected(self.measured - self.simulated(parameters))
 
     def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """Compute the residuals (N,) and the sensitivities (N, 3) to T0, C and k, the basis projected out of both."""
+        """Compute the residuals (N,) and the sensitivities (N, 3) to T0, C and 1/k, the basis projected out of both."""
         simulated, slopes = self.simulated_and_slopes(parameters)
-        return self._projected(self.measured - simulated), self._projected(slopes)
+        return self.projected(self.measured - simulated), self.projected(slopes)
 
     def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and k."""
+        """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and 1/k."""
         forces, slopes = [], []
         for t in self.prepared:
             force, slope = element_force_sensitivities(
@@ -90,11 +93,16 @@ class Objective:
             slopes.append(t.at_counted(slope))
         return np.concatenate(forces), np.concatenate(slopes)
 
-    def _projected(self, values: Array) -> Array:
-        """Project the basis out of forces (N,) or (N, p).
+    @cached_property
+    def _weight(self) -> Array:
+        return np.concatenate([t.weight[t.counted] for t in self.prepared])
+
+    def projected(self, values: Array) -> Array:
+        """Project the basis out of forces (N,) or (N, p), samples beside an unresolved jump left out.
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
+        values = values * self._weight.reshape(-1, *([1] * (values.ndim - 1)))
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
@@ -110,43 +118,31 @@ class Objective:
         return float(np.max(np.abs(self.measured))), speed, stroke
 
     @cached_property
-    def bounds(self) -> tuple[Bingham, Bingham]:
-        """Smallest and largest parameters of the search, from the scales of the data.
+    def coordinates(self) -> ElementCoordinates:
+        """Coordinates of the search."""
+        return ElementCoordinates(*self.scales)
 
-        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to 1e4 of peak force over
-        the range of displacement.
-        """
-        force, speed, stroke = self.scales
-        return (
-            Bingham(0.0, 1e-4 * force / speed, 0.1 * force / stroke),
-            Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
-        )
+    def to_search(self, parameters: Bingham) -> Array:
+        """Return the search coordinates (3,) within their bounds."""
+        return np.clip(self.coordinates.to_search(*parameters), 0.0, self.coordinates.high)
 
-    @cached_property
-    def search_bounds(self) -> tuple[Array, Array]:
-        """Bounds (3,) of the search coordinates."""
-        low, high = self.bounds
-        return (
-            np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
-            np.array([LARGEST_PRE_SLIP, np.log(high.damping), np.log(high.stiffness)]),
-        )
+    def from_search(self, x: Array) -> Bingham:
+        """Return the parameters at search coordinates (3,)."""
+        return Bingham(*self.coordinates.from_search(x))
 
     def slips(self, parameters: Bingham) -> bool:
         """Tell whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
         return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
 
     def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
-        """Tell whether each parameter lies at a bound of the search; a friction of zero does not."""
-        low, high = self.search_bounds
-        x = to_search(parameters, self.scales[2])
-        beyond = x >= high - AT_BOUND * np.abs(high)
-        below = x <= low + AT_BOUND * np.abs(low)
-        return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
+        """Tell whether each parameter lies at a bound of the search; the limits of the law are results."""
+        x, high = self.coordinates.to_search(*parameters), self.coordinates.high
+        beyond = x >= high * (1.0 - 1e-3)
+        return bool(beyond[0]) or not self.slips(parameters), bool(beyond[1]), bool(beyond[2])
 
     def clipped(self, parameters: Bingham) -> Bingham:
         """Return the parameters clipped to the bounds."""
-        stroke = self.scales[2]
-        return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
+        return self.from_search(self.to_search(parameters))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,25 +154,7 @@ class Fit:
     residuals: Array
     """(N,) measured less simulated force at the counted samples [N]."""
     slopes: Array
-    """(N, 3) derivatives of the simulated force by T0, C and k."""
-
-
-def to_search(parameters: Bingham, stroke: float) -> Array:
-    """Return the search coordinates (3,): pre-slip T0/k as a share of the stroke, logarithms of C and k."""
-    friction, damping, stiffness = parameters
-    return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
-
-
-def from_search(x: Array, stroke: float) -> Bingham:
-    """Return the parameters at search coordinates (3,)."""
-    stiffness = float(np.exp(x[2]))
-    return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
-
-
-def search_slopes(parameters: Bingham, stroke: float) -> Array:
-    """Return the derivatives (3, 3) of T0, C, k (rows) by the search coordinates (columns)."""
-    friction, damping, stiffness = parameters
-    return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])
+    """(N, 3) derivatives of the simulated force by T0, C and 1/k."""
 
 
 # --- Start from the characteristic, as in the first stage of the paper ---
@@ -275,13 +253,27 @@ def fit_separable(objective: Objective) -> Fit:
     to that of a known optimum is no coincidence.
     """
     best = descend(objective, graphical_start(objective.prepared))
-    for start in grid_starts(objective):
+    for start in (fit_rigid(objective).parameters, *grid_starts(objective)):
         try:
             fit = descend(objective, start, best.criterion)
         except KnownOptimum:
             return best
         best = min(best, fit, key=lambda f: f.criterion)
     return best
+
+
+def fit_rigid(objective: Objective) -> Fit:
+    """Fit the rigid damper, whose force is linear in T0 and C.
+
+    Equation: min sum (F - T0 sign(v) - C v)^2, T0 and C >= 0        Source: Lawson and Hanson 1974, ch. 23
+    """
+    from scipy.optimize import nnls
+
+    force, speed, _ = objective.scales
+    slopes = objective.residuals_and_slopes(Bingham(force, force / speed, np.inf))[1]
+    terms = slopes[:, :2] * (force, force / speed)
+    friction, damping = nnls(terms, objective.projected(objective.measured))[0]
+    return _fit_at(objective, Bingham(float(friction) * force, float(damping) * force / speed, np.inf))
 
 
 class KnownOptimum(Exception):  # noqa: N818  # nothing went wrong
@@ -308,7 +300,7 @@ def grid_starts(objective: Objective) -> list[Bingham]:
     return [objective.clipped(start) for _, start in sorted(found)[:GRID_DESCENTS]]
 
 
-def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit:
+def descend(objective: Objective, start: Bingham, known: float | None = None, free: int = 3) -> Fit:
     """Find the optimum from a starting point by trust-region least squares within the bounds.
 
     Parameters
@@ -316,6 +308,7 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
     objective : what is minimised
     start : of the search
     known : criterion of an optimum that is known already
+    free : 2 to leave the stiffness where it starts
 
     Raises
     ------
@@ -323,28 +316,28 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
     """
     from scipy.optimize import least_squares
 
-    stroke = objective.scales[2]
     norm = np.sqrt(objective.energy)
-    low, high = objective.search_bounds
+    begin, high = objective.to_search(start), objective.coordinates.high
 
-    def reduced(fit: Fit) -> Array:
+    def reduced(fit: Fit, x: Array) -> Array:
         """Return the triangle (4, 4) with the inner products of slopes and residuals.
 
         Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
         """
-        together = np.column_stack([fit.slopes @ -search_slopes(fit.parameters, stroke), fit.residuals])
+        together = np.column_stack([-fit.slopes * objective.coordinates.slopes(x), fit.residuals])
         together /= norm
         return np.asarray(np.linalg.qr(together, mode="r"))
 
     memory: dict[bytes, tuple[Fit, Array]] = {}
 
-    def at(x: Array) -> tuple[Fit, Array]:
+    def at(moved: Array) -> tuple[Fit, Array]:
+        x = np.concatenate([moved, begin[free:]])
         key = x.tobytes()
         if key not in memory:
             if len(memory) == _CACHED_POINTS:
                 memory.pop(next(iter(memory)))
-            fit = _fit_at(objective, from_search(x, stroke))
-            memory[key] = fit, reduced(fit)
+            fit = _fit_at(objective, objective.from_search(x))
+            memory[key] = fit, reduced(fit, x)
         return memory[key]
 
     def residuals_at(x: Array) -> Array:
@@ -354,21 +347,29 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
         return triangle[:, 3]
 
     def slopes_at(x: Array) -> Array:
-        return at(x)[1][:, :3]
+        return at(x)[1][:, :free]
 
-    inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
     found = least_squares(
         residuals_at,
-        inside,
+        np.clip(begin, 1e-9, high - 1e-9)[:free],
         jac=slopes_at,
-        bounds=(low, high),
+        bounds=(np.zeros(free), high[:free]),
         x_scale="jac",
         xtol=TOLERANCE,
         ftol=TOLERANCE,
         gtol=TOLERANCE,
         max_nfev=100,
     )
-    return at(found.x)[0]
+    return _settled(objective, np.concatenate([found.x, begin[free:]]), at(found.x)[0])
+
+
+def _settled(objective: Objective, x: Array, found: Fit) -> Fit:
+    """Return the optimum in the limits of the law that it came next to, unless the criterion is less beside them."""
+    limit = np.where(x < AT_LIMIT, 0.0, x)
+    if np.array_equal(limit, x):
+        return found
+    settled = _fit_at(objective, objective.from_search(limit))
+    return settled if settled.criterion <= found.criterion * (1.0 + SAME_OPTIMUM) else found
 
 
 def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
@@ -398,8 +399,8 @@ def _inner_products(pieces: list[tuple[Array, float, Array, int]], delta: float,
 
 # --- Evolutionary method ---
 
-LEAST_FRICTION = 1e-4
-"""Least friction of the search, as a share of the peak force, since its logarithm is searched."""
+LEAST = (1e-4, 1e-4, 1e-4)
+"""Least T0, C and 1/k of the search, in the units of the largest, since logarithms are searched."""
 PENALTY = 10.0
 """Criterion of parameters outside the bounds of the separable method: ten times that of no model at all."""
 LEAST_SPREAD = 1e-8
@@ -414,7 +415,7 @@ def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int
 def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
     """Return the best member of the last generation of a differential evolution on the criterion.
 
-    Equation: minimise W_s over log T0, log C, log k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
+    Equation: minimise W_s over log T0, log C, log 1/k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
 
     Parameters
     ----------
@@ -428,11 +429,17 @@ def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: 
     """
     from scipy.optimize import Bounds, differential_evolution
 
-    low, high = objective.bounds
-    low = low._replace(friction=LEAST_FRICTION * high.friction)
+    force, speed, stroke = objective.scales
+    units = np.array([force, force / speed, stroke / force])
+    high = units * LARGEST
+    low = units * LEAST
+
+    def parameters_at(logarithms: Array) -> Bingham:
+        friction, damping, compliance = (float(p) for p in np.exp(logarithms))
+        return Bingham(friction, damping, 1.0 / compliance)
 
     def criterion(logarithms: Array) -> float:
-        parameters = Bingham(*(float(p) for p in np.exp(logarithms)))
+        parameters = parameters_at(logarithms)
         return objective.criterion(parameters) if objective.slips(parameters) else PENALTY
 
     found = differential_evolution(
@@ -446,4 +453,4 @@ def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: 
         init="sobol",
         polish=False,
     )
-    return Bingham(*(float(p) for p in np.exp(found.x)))
+    return parameters_at(found.x)

@@ -20,6 +20,7 @@ from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
 from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare
+from pzd.identification.stiffness import settle_stiffness
 from pzd.identification.trust import ParameterEvidence
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
 from pzd.signals.measures import criterion, rms
@@ -42,8 +43,10 @@ def identify_condition(
     """
     records = [test for record in condition.records for test in separate_tests(record)]
     objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
+    fit, stiffest = settle_stiffness(records, objective, fit, config.nuisance)
     fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance)
-    (row,) = parameter_rows(objective, [(condition.labels, fit.parameters)], (fit.residuals, fit.slopes), fitted)
+    optimum = [(condition.labels, fit.parameters)]
+    (row,) = parameter_rows(objective, optimum, (fit.residuals, fit.slopes), fitted, stiffest=stiffest)
     return row, None if auxiliary is None else _auxiliary_row(condition.labels, auxiliary)
 
 
@@ -92,6 +95,7 @@ def parameter_rows(
     fitted: tuple[Array, Array],
     records: Sequence[FittedRecord],
     touched: Mask | None = None,
+    stiffest: float | None = None,
 ) -> list[ParameterRow]:
     """Return the rows of a fit: one of a condition, or one a voltage node.
 
@@ -102,12 +106,14 @@ def parameter_rows(
     fitted : (N,) residuals and (N, 3 rows) slopes
     records : the same by record
     touched : (N, rows) samples on which each row is judged; None for all
+    stiffest : stiffness from which on the tests do not tell k from infinity [N/m]; None where it was not looked for
     """
     residuals, slopes = fitted
     misfit = trust.misfit_of(records)
     noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
     widths = half_widths(records, misfit).reshape(-1, 3)
-    scales = np.stack([trust.parameter_scales(parameters, objective.measured) for _, parameters in optimum])
+    speed = objective.scales[1]
+    scales = np.stack([trust.parameter_scales(parameters, objective.measured, speed) for _, parameters in optimum])
     shares = trust.partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
     cosines = trust.stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
     rows = []
@@ -116,8 +122,8 @@ def parameter_rows(
         measured, left = objective.measured[here], residuals[here]
         share = shares[i] * np.sqrt(objective.energy / float(measured @ measured))
         facts = np.stack([scales[i], noise[i], widths[i], share, cosines[i]])
-        evidence = trust.parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit)
-        rows.append(parameter_row(labels, parameters, widths[i], evidence, (measured, left)))
+        evidence = trust.parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit, stiffest)
+        rows.append(parameter_row(labels, parameters, widths[i], evidence, (measured, left), stiffest))
     return rows
 
 
@@ -127,6 +133,7 @@ def parameter_row(
     widths: Array,
     evidence: Sequence[ParameterEvidence],
     fitted: tuple[Array, Array],
+    stiffest: float | None = None,
 ) -> ParameterRow:
     """Return the row of one condition or node; an undetermined parameter has no number.
 
@@ -134,16 +141,19 @@ def parameter_row(
     ----------
     labels : setting, voltage, temperature
     parameters : the optimum
-    widths : (3,) half widths of the 95 % intervals
+    widths : (3,) half widths of the 95 % intervals of T0, C and 1/k
     evidence : on T0, C and k
     fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
+    stiffest : stiffness from which on the tests do not tell k from infinity [N/m], the lower end of its interval
     """
     status, determined = trust.trust_of(evidence)
     measured, residuals = fitted
     cells = label_columns(labels)
-    names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "log", "log"), strict=True)
+    names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "positive", "inverse"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
+    if stiffest is not None and np.isfinite(stiffest):
+        cells["k_N_per_m_low95"] = stiffest
     cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}
     return ParameterRow.model_validate(cells)
 

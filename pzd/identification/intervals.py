@@ -321,7 +321,8 @@ def interval_columns(
     name : of the column
     value : None where undetermined
     width : half width of the interval, None where there is none
-    scale : on which the interval is symmetric: `linear`, `positive` (linear, cut at zero) or `log`
+    scale : on which the interval is symmetric: `linear`, `positive` (linear, cut at zero), `inverse` (that of the
+        inverse, whose width is given; it may have no upper end) or `log`
     widest : largest half width on the logarithmic scale
 
     Examples
@@ -334,6 +335,9 @@ def interval_columns(
     if scale == "log":
         ratio = float(np.exp(min(width / value, widest)))
         low, high = value / ratio, value * ratio
+    elif scale == "inverse":
+        least = 1.0 / value - width
+        return {name: value, f"{name}_low95": 1.0 / (1.0 / value + width), f"{name}_high95": 1.0 / least if least > 0.0 else None}
     else:
         low, high = value - width, value + width
         low = max(low, 0.0) if scale == "positive" else low

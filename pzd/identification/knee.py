@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, ParameterRow, PredictedRow, UnitRow
-from pzd.artefacts.identified import FALLBACK
 from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
@@ -30,6 +29,10 @@ from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.segmentation import separate_tests
 
 log = logging.getLogger(__name__)
+
+
+STIFF = 1e8
+"""Stiffness from which a knee is searched where the Bingham fit has none [N/m]."""
 
 
 def identify_knees(
@@ -58,7 +61,7 @@ def identify_knees(
     found = []
     for number, (condition, bingham) in enumerate(conditions, start=1):
         tests = KneeData.of([test for record in condition.records for test in separate_tests(record)])
-        fit = fit_knee(tests, bingham.k_N_per_m or FALLBACK["k_N_per_m"])
+        fit = fit_knee(tests, bingham.k_N_per_m or bingham.k_N_per_m_low95 or STIFF)
         row = knee_row(condition.labels, tests, fit, config.nuisance)
         rows.append(row)
         forces += knee_forces(row)

@@ -32,6 +32,8 @@ ConstantRow = tuple[Condition, ParameterRow]
 log = logging.getLogger(__name__)
 DWELL_TIME = 0.05
 """Time for which the voltage has been near a node before a sample serves for starting values [s]."""
+LEAST_COORDINATES = np.array([0.0, 0.0, 0.1])
+"""Least search coordinates of a node: between a rigid node and another k is not linear."""
 FEWEST_NEAR_NODE = 200
 """Fewest samples near a node for starting values of its own."""
 
@@ -146,11 +148,11 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     """Find the optimum over all free nodes together by trust-region least squares."""
     from scipy.optimize import least_squares
 
-    stroke, norm = objective.constant.scales[2], np.sqrt(objective.constant.energy)
-    low, high = (np.tile(b, len(starts)) for b in objective.constant.search_bounds)
+    constant, norm = objective.constant, np.sqrt(objective.constant.energy)
+    low, high = (np.tile(b, len(starts)) for b in (LEAST_COORDINATES, constant.coordinates.high))
 
     def parameters(x: Array) -> list[Bingham]:
-        return [bingham_fit.from_search(part, stroke) for part in x.reshape(-1, 3)]
+        return [constant.from_search(part) for part in x.reshape(-1, 3)]
 
     def residuals_at(x: Array) -> Array:
         return np.asarray(objective.residuals(parameters(x)) / norm)
@@ -158,10 +160,9 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     def slopes_at(x: Array) -> Array:
         free = parameters(x)
         slopes = objective.slopes(free, objective.residuals(free))
-        inner = [slopes[:, 3 * i : 3 * i + 3] @ bingham_fit.search_slopes(p, stroke) for i, p in enumerate(free)]
-        return np.asarray(-np.hstack(inner) / norm)
+        return np.asarray(-slopes * np.concatenate([constant.coordinates.slopes(p) for p in x.reshape(-1, 3)]) / norm)
 
-    start = np.concatenate([bingham_fit.to_search(s, stroke) for s in starts])
+    start = np.concatenate([constant.to_search(s) for s in starts])
     found = least_squares(
         residuals_at,
         np.clip(start, low + 1e-9, high - 1e-9),
@@ -302,13 +303,16 @@ class MovingObjective:
         return np.asarray(self.constant.measured - np.concatenate(forces))
 
     def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
-        """Compute the derivatives (N, 3 f) of the force by T0, C, k of each free node, by difference quotients."""
-        peak = self.constant.scales[0]
+        """Compute the derivatives (N, 3 f) of the force by T0, C, 1/k of each free node, by difference quotients."""
+        peak, speed, _ = self.constant.scales
         columns = []
-        for i, parameters in enumerate(free):
-            steps = DIFFERENCE * np.array([max(parameters.friction, 1e-2 * peak), *parameters[1:]])
+        for i, (friction, damping, stiffness) in enumerate(free):
+            steps = DIFFERENCE * np.array(
+                [max(friction, 1e-2 * peak), max(damping, 1e-2 * peak / speed), 1.0 / stiffness]
+            )
             for j, step in enumerate(steps):
-                moved = Bingham(*(p + step * (i == j) for i, p in enumerate(parameters)))
+                change = step * np.eye(3)[j]
+                moved = Bingham(friction + change[0], damping + change[1], 1.0 / (1.0 / stiffness + change[2]))
                 other = [*free[:i], moved, *free[i + 1 :]]
                 columns.append((residuals - self.residuals(other)) / step)
         return np.stack(columns, axis=-1)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles, cycles_of
-from pzd.signals.jumps import jumps, jumps_in_cycles
+from pzd.signals.jumps import jumps, jumps_in_cycles, unresolved_flanks
+from pzd.signals.kinematics import kinematics
 from pzd.signals.measures import REVERSAL_SHARE, reversals
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 from pzd.signals.period import moving_range
@@ -49,6 +50,8 @@ class PreparedRecord:
     """(n,) measured force [N]."""
     counted: NDArray[np.bool_]
     """(n,) whether the sample enters the criterion."""
+    weight: Array
+    """(n,) 1, and 0 at a sample that a jump of the force passes by chance on one side or the other."""
     positions: Array | None = None
     """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""
 
@@ -85,13 +88,19 @@ def prepare(record: Record) -> PreparedRecord:
     clock = record.time if positions is not None else np.linspace(record.time[0], record.time[-1], record.time.size)
     return PreparedRecord(
         record.name,
-        CubicSpline(clock, record.displacement)(time),
+        CubicSpline(clock, _clean_displacement(record))(time),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
         in_motion(record),
+        np.where(unresolved_flanks(record.force, reversals(record.displacement), record.rate), 0.0, 1.0),
         positions,
     )
+
+
+def _clean_displacement(record: Record) -> Array:
+    """Return the displacement (n,) without its noise, which a stiff oil spring would turn into force [m]."""
+    return kinematics(record.time, record.displacement, cycles_of(record)).displacement
 
 
 def in_motion(record: Record) -> NDArray[np.bool_]:
@@ -224,6 +233,7 @@ def fitted_records(
     ):
         counted = each.counted
         nuisances = nuisance_columns(record.force[counted] - left, record.rate, nuisance, counted)
+        nuisances *= each.weight[counted, None]
         run = cycles_of(record) if constant else None
         found.append(FittedRecord(record, counted, left, slope, nuisances, run, constant))
     return tuple(found)

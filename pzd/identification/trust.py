@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.identification.bingham_fit import Bingham, Objective
+from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective
 from pzd.identification.prepared_record import FittedRecord
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
@@ -28,10 +28,11 @@ WEAK_WIDTH = 0.1
 WEAK_SHIFT = 0.2
 """Largest shift by the sensor error of a parameter that is not weak, as a share of it."""
 FRICTION_FLOOR = 0.05
-"""T0 is judged against itself or this share of the r.m.s. force, the larger: a friction of zero is a result."""
+"""T0, and the viscous force at the r.m.s. speed, are judged against themselves or this share of the r.m.s. force, the
+larger: a friction or a damping of zero is a result."""
 SPRING_TO_NOISE = 10.0
-"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is determined: below,
-the fit of k follows the noise."""
+"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below, the
+fit of k follows the noise."""
 LARGEST_RESIDUAL = 0.2
 """Residual, as a share of the r.m.s. force, above which all parameters are weak."""
 CONVERGENCE_COSINE = 1e-3
@@ -57,11 +58,17 @@ class ParameterEvidence:
     """Reason why it is undetermined whatever the numbers."""
     doubt: str | None = None
     """Reason why it is weak whatever the numbers."""
+    shown: bool = False
+    """Whether a model without it is rejected: however wide its interval, it has a value then."""
 
     def undetermined(self) -> str | None:
         """Return the reason why the data do not determine it, None where they do."""
         if self.veto:
             return self.veto
+        return None if self.shown else self._unknown()
+
+    def _unknown(self) -> str | None:
+        """Return the reason why the numbers do not determine it, None where they do."""
         if self.sensitivity <= 0.0:
             return "the force does not depend on it, or another parameter makes it up"
         if self.shift > UNDETERMINED_SHARE:
@@ -74,6 +81,8 @@ class ParameterEvidence:
         """Return the reason why it is weak, None where it is not."""
         if self.doubt:
             return self.doubt
+        if self.shown and (reason := self._unknown()):
+            return reason
         if self.half_width > WEAK_WIDTH * self.scale:
             return f"95 % interval of +-{_percent(self.half_width / self.scale)}"
         if self.shift > WEAK_SHIFT:
@@ -120,12 +129,15 @@ def _percent(share: float) -> str:
 PARAMETER_NAMES = ("T0", "C", "k")
 TARE = 0.3
 """Mean force, as a share of the r.m.s., above which a tare of the load cell is suggested."""
-NO_FRICTION = 1e-6
-"""Friction, as a share of the peak force, below which it is zero."""
 
 
 def parameter_evidence(
-    objective: Objective, parameters: Bingham, criterion: float, facts: Array, misfit: Misfit
+    objective: Objective,
+    parameters: Bingham,
+    criterion: float,
+    facts: Array,
+    misfit: Misfit,
+    stiffest: float | None = None,
 ) -> list[ParameterEvidence]:
     """Collect the evidence on T0, C and k.
 
@@ -137,6 +149,7 @@ def parameter_evidence(
     facts : (5, 3) scale, half width of the 95 % interval by noise alone and in all, partial sensitivity, and cosine of
         stationarity of each
     misfit : of the model
+    stiffest : stiffness from which on the tests do not tell k from infinity [N/m]; None where it was not looked for
     """
     scales, noise, widths, visible, cosines = facts.tolist()
     unsettled = _not_converged(objective, parameters, cosines)
@@ -148,12 +161,16 @@ def parameter_evidence(
         else None
         for bounded, moving in zip(objective.at_bounds(parameters), unsettled, strict=True)
     ]
-    vetoes[2] = vetoes[2] or _noise_hides_stiffness(objective, parameters)
     doubt = _doubt(float(np.sqrt(criterion)), misfit)
+    doubts = [doubt, doubt, doubt]
+    if stiffest is not None and np.isfinite(stiffest):
+        vetoes[2] = f"above {stiffest:.2g} N/m, and these tests show no more of it"
+    else:
+        doubts[2] = doubt or _noise_hides_stiffness(objective, parameters)
     return [
-        ParameterEvidence(name, scale, by_noise, width, share, veto, doubt)
-        for name, scale, by_noise, width, share, veto in zip(
-            PARAMETER_NAMES, scales, noise, widths, visible, vetoes, strict=True
+        ParameterEvidence(name, scale, by_noise, width, share, veto, why, shown=name == "k" and stiffest == np.inf)
+        for name, scale, by_noise, width, share, veto, why in zip(
+            PARAMETER_NAMES, scales, noise, widths, visible, vetoes, doubts, strict=True
         )
     ]
 
@@ -163,9 +180,11 @@ def friction_scale(friction: float, force: Array) -> float:
     return max(friction, FRICTION_FLOOR * rms(force))
 
 
-def parameter_scales(parameters: Bingham, measured: Array) -> Array:
-    """Return the scales (3,) of T0, C and k."""
-    return np.array([friction_scale(parameters.friction, measured), parameters.damping, parameters.stiffness])
+def parameter_scales(parameters: Bingham, measured: Array, speed: float) -> Array:
+    """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N], by measured forces [N] and a peak speed [m/s]."""
+    least = FRICTION_FLOOR * rms(measured) / (np.sqrt(0.5) * speed)  # at the r.m.s. speed of a sine
+    friction, damping, stiffness = parameters
+    return np.array([friction_scale(friction, measured), max(damping, least), 1.0 / stiffness])
 
 
 def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
@@ -224,11 +243,9 @@ def _doubt(left: float, misfit: Misfit) -> str | None:
 
 
 def _not_converged(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:
-    """Tell for each parameter whether the criterion still falls along it; at a friction of zero it may."""
-    unsettled = [c > CONVERGENCE_COSINE for c in cosines]
-    if parameters.friction <= NO_FRICTION * objective.scales[0]:
-        unsettled[0] = False
-    return unsettled
+    """Tell for each parameter whether the criterion still falls along it; at a limit of the law it may."""
+    x = objective.coordinates.to_search(*parameters)
+    return [c > CONVERGENCE_COSINE and at > AT_LIMIT for c, at in zip(cosines, x.tolist(), strict=True)]
 
 
 def _tare_hint(objective: Objective) -> str:

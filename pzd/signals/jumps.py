@@ -6,6 +6,8 @@ chance. Where samples are left out, nothing is differenced across the gap.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pzd.record import Array, Mask
@@ -67,6 +69,41 @@ def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     place = run.phase(time) * cycle.size
     before = np.floor(place).astype(np.int64) % cycle.size
     return np.asarray(np.maximum(cycle[before], cycle[(before + 1) % cycle.size]))
+
+
+FLANK_LATE = 0.002
+"""How much later or earlier than the rod a force may turn [s]: four standard deviations of a test's own delay."""
+FLANK_TO_NOISE = 8.0
+"""Least size of a jump, in the noise of one sample."""
+
+
+def unresolved_flanks(force: Array, turns: Sequence[int], rate: float) -> Mask:
+    """Find the samples on either side of a jump at a reversal of the rod that goes most of its way within one interval.
+
+    Its instant is chance there; a flank of several samples is evidence of the oil spring.
+
+    Parameters
+    ----------
+    force : (n,) [N]
+    turns : samples at which the rod turns round
+    rate : sampling rate [Hz]
+
+    Returns
+    -------
+    (n,) mask
+    """
+    found = np.zeros(force.size, dtype=np.bool_)
+    noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(force, 2)))) / np.sqrt(6.0) if force.size > 2 else 0.0
+    reach = int(np.ceil(FLANK_LATE * rate)) + 2
+    for turn in turns:
+        low, high = max(turn - reach, 0), min(turn + reach + 1, force.size)
+        steps = np.diff(force[low:high])
+        if not steps.size:
+            continue
+        change, steepest = abs(float(force[high - 1] - force[low])), int(np.argmax(np.abs(steps)))
+        if abs(steps[steepest]) > max(0.5 * change, FLANK_TO_NOISE * noise):
+            found[low + steepest : low + steepest + 2] = True
+    return found
 
 
 def jump_timing_error(measured: Array, predicted: Array) -> Array:

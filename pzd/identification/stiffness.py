@@ -1,0 +1,74 @@
+"""Whether the tests show the oil spring: the rigid damper beside the elastic one, and how stiff it is at least.
+
+A stiff oil spring shows for an instant after each reversal alone, so that neither the curvature of the criterion at 1/k
+= 0 nor at its optimum says how far 1/k may go. Models are compared as wholes instead: what one would change of the other
+is a column beside the slopes, and noise, sensors and the parameters that follow say how well its amplitude is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pzd.fit.element_coordinates import HARDLY_ELASTIC
+from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_rigid
+from pzd.identification.intervals import half_widths
+from pzd.identification.prepared_record import fitted_records
+from pzd.identification.trust import Misfit
+from pzd.record import Record
+from pzd.signals.nuisance import NuisanceConfig
+
+BISECTIONS = 7
+"""Halvings of the logarithm of the bound: it is known to a few percent then."""
+
+
+def settle_stiffness(
+    records: Sequence[Record], objective: Objective, fit: Fit, nuisance: NuisanceConfig
+) -> tuple[Fit, float]:
+    """Return the rigid damper and the least stiffness [N/m] where the tests do not show the oil spring.
+
+    Parameters
+    ----------
+    records : that were fitted
+    objective : their data
+    fit : the optimum over T0, C and k
+    nuisance : standard deviations of what differs from test to test
+
+    Returns
+    -------
+    the fit to be used, and the stiffness from which on k lies in the 95 % interval; infinite where the tests show k
+    """
+    rigid = fit_rigid(objective)
+    best = min(fit, rigid, key=lambda f: f.criterion)
+    if _rejected(records, objective, best, rigid, nuisance):
+        return fit, np.inf
+    unit = objective.scales[2] / objective.scales[0]
+    low, high = np.log(1e-2 * HARDLY_ELASTIC * unit), np.log(unit)
+    if np.isfinite(best.parameters.stiffness):
+        low = max(low, float(np.log(1.0 / best.parameters.stiffness)))
+    start = rigid.parameters
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        start = Bingham(start.friction, start.damping, float(np.exp(-middle)))
+        trial = descend(objective, start, free=2)
+        if _rejected(records, objective, best, trial, nuisance):
+            high = middle
+        else:
+            low, start = middle, trial.parameters
+    return rigid, float(np.exp(-high))
+
+
+def _rejected(records: Sequence[Record], objective: Objective, best: Fit, other: Fit, nuisance: NuisanceConfig) -> bool:
+    """Tell whether a model lies outside the 95 % interval on the line from the best one to it.
+
+    Equation: F_a = F_best + a (F_other - F_best); |1 - a^| > h, a^ and its half width h beside T0 and C
+    """
+    change = best.residuals - other.residuals
+    if not np.any(change):
+        return False
+    columns = np.column_stack([best.slopes[:, :2], change])
+    size = np.linalg.norm(columns, axis=0)
+    amplitude = np.linalg.lstsq(columns / np.where(size > 0.0, size, 1.0), best.residuals, rcond=1e-12)[0][2] / size[2]
+    fitted = fitted_records(records, objective.prepared, (best.residuals, columns), nuisance)
+    return bool(abs(1.0 - amplitude) > half_widths(fitted, Misfit(0.0, 0.0))[2])
