@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pzd.compiled import compiled, inlined
 from pzd.damper import regimes
 from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, nudged, row_of, stroke_law, stroke_slope
-from pzd.damper.element import STIFFEST, relaxation
+from pzd.damper.element import relaxation
 from pzd.damper.flow import breakaway, relief, relief_slope, smooth_force, smooth_slope, smooth_speed
 from pzd.damper.regimes import RELIEF, SMOOTH, STICK, UNSOLVED, TimeStep, extension_speed, row_in, spring_force
 from pzd.record import Array
@@ -117,6 +117,9 @@ def march_sensitivities(
     return force, slopes
 
 
+RIGID = 1e-6
+"""Deflection [m] of a rigid damper's oil spring on its path, by T0 + C v at 1 m/s: less than any displacement sensor
+shows, and not so stiff that rounding of the deflection shows in the force."""
 LEAST_DAMPING = 1e-4
 """Least C on its path [N s/m], and least C v at 1 m/s as a share of T0: the flow curve has to rise, to be inverted."""
 
@@ -124,8 +127,8 @@ LEAST_DAMPING = 1e-4
 def _off_the_limits(rows: Array) -> Array:
     """Return (n, r) rows in which a rigid damper is hardly elastic, and one without damping hardly damps."""
     moved = rows.copy()
-    moved[:, K] = np.minimum(rows[:, K], STIFFEST)
     moved[:, C] = np.maximum(rows[:, C], LEAST_DAMPING * np.maximum(rows[:, T0], 1.0))
+    moved[:, K] = np.minimum(rows[:, K], (moved[:, T0] + moved[:, C]) / RIGID)
     return moved
 
 

@@ -21,7 +21,7 @@ from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, S
 from pzd.diagnosis.fit.least_squares import FitResult
 from pzd.diagnosis.fit.likelihood import WeightedRecord, weighted_record
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
-from pzd.diagnosis.fit.problem import Budget, Problem
+from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
 from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.measures import criterion
@@ -160,7 +160,6 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
         whole,
         damper.base,
         _scales(whole, prepared, damper),
-        _largest_rate(prepared, damper),
         reference,
         frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values),
         campaign.budget,
@@ -171,21 +170,6 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     )
 
 
-def _largest_rate(prepared: Sequence[PreparedRecord], damper: Damper) -> float:
-    """Estimate the largest k / C [1/s] that the samples tell from a larger one.
-
-    In slip the force settles with C / k. After a reversal it turns over a stroke of 2 T0 / k, which the piston covers
-    within one sample where k is larger than the second term says.
-
-    Equation: max(3 f, 4 T0 f^2 / (C a)), from a t^2 / 2 = 2 T0 / k at t = 1 / f, a the peak acceleration of the
-    gentlest test
-    """
-    rate = max(p.record.rate for p in prepared)
-    gentlest = min(float(np.max(np.abs(p.record.acceleration))) for p in prepared)
-    turning = max(4.0 * row.T0_N * rate**2 / (row.C_Ns_per_m * gentlest) for row in damper.base)
-    return max(thresholds.MOST_TIME_CONSTANTS * rate, turning)
-
-
 def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecord], damper: Damper) -> Scales:
     """Return the magnitudes by which effect parameters are scaled."""
     records, peaks = [p.record for p in prepared], [o.peak for o in observed]
@@ -193,13 +177,14 @@ def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecor
     def largest(channels: Iterable[Array]) -> float:
         return max(float(np.max(np.abs(channel))) for channel in channels)
 
+    speed = largest(r.velocity for r in records)
     return Scales(
         max(peaks),
         min(peaks),
-        largest(r.velocity for r in records),
+        speed,
         largest(r.displacement for r in records),
         largest(r.acceleration for r in records),
-        float(np.median([row.C_Ns_per_m for row in damper.base])),
+        max(float(np.median([row.C_Ns_per_m for row in damper.base])), UNSEEN[0] * max(peaks) / speed),
         voltage_scale(records),
     )
 

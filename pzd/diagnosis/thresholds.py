@@ -70,11 +70,6 @@ SHARE_WORTH_FITTING = 0.02
 
 Reason: at five times its promise it would still pay a tenth of the best, and no rival does that; not tuned."""
 
-MOST_TIME_CONSTANTS = 3.0
-"""Time constants C/k of an element per sample, at most; a faster element is not searched for.
-
-Reason: after three the element is at rest but for 5 %, so that samples cannot tell it from a faster one."""
-
 # --- When an effect is accepted (search/acceptance.py)
 
 LEAST_CLOSED = 0.2

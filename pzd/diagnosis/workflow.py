@@ -49,7 +49,7 @@ from pzd.diagnosis.verdict import (
 from pzd.identification.bingham_fit import Bingham
 from pzd.identification.condition import parameter_row
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales
+from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales, stiffness_veto
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
@@ -238,19 +238,22 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
     compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
     rows = []
     doubt = DOUBTS.get(verdict) if fitted.converged else NOT_CONVERGED
-    half_widths = base_half_widths(fitted, whole.scales.force)
+    half_widths = base_half_widths(fitted, whole.coordinates)
     for place, (row, widths) in enumerate(zip(fitted.damper.base, half_widths, strict=True)):
         mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
         measured = np.concatenate([m for m, _ in mine])
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
-        scales = parameter_scales(parameters, measured).tolist()
+        scales = parameter_scales(parameters, measured, whole.scales.speed).tolist()
+        stiffest = 1.0 / (scales[2] + float(widths[2])) if scales[2] <= widths[2] else np.inf
         evidence = [
-            ParameterEvidence(name, scale, width, width, SHOWN, doubt=doubt)
-            for name, scale, width in zip(PARAMETER_NAMES, scales, widths.tolist(), strict=True)
+            ParameterEvidence(name, scale, width, width, SHOWN, veto, doubt)
+            for name, scale, width, veto in zip(
+                PARAMETER_NAMES, scales, widths.tolist(), (None, None, stiffness_veto(stiffest)), strict=True
+            )
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)
-        rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals)))
+        rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals), stiffest))
     return tuple(rows)
 
 

@@ -337,7 +337,11 @@ def interval_columns(
         low, high = value / ratio, value * ratio
     elif scale == "inverse":
         least = 1.0 / value - width
-        return {name: value, f"{name}_low95": 1.0 / (1.0 / value + width), f"{name}_high95": 1.0 / least if least > 0.0 else None}
+        return {
+            name: value,
+            f"{name}_low95": 1.0 / (1.0 / value + width),
+            f"{name}_high95": 1.0 / least if least > 0.0 else None,
+        }
     else:
         low, high = value - width, value + width
         low = max(low, 0.0) if scale == "positive" else low

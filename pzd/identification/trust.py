@@ -163,8 +163,8 @@ def parameter_evidence(
     ]
     doubt = _doubt(float(np.sqrt(criterion)), misfit)
     doubts = [doubt, doubt, doubt]
-    if stiffest is not None and np.isfinite(stiffest):
-        vetoes[2] = f"above {stiffest:.2g} N/m, and these tests show no more of it"
+    if veto := stiffness_veto(stiffest):
+        vetoes[2] = veto
     else:
         doubts[2] = doubt or _noise_hides_stiffness(objective, parameters)
     return [
@@ -173,6 +173,13 @@ def parameter_evidence(
             PARAMETER_NAMES, scales, noise, widths, visible, vetoes, doubts, strict=True
         )
     ]
+
+
+def stiffness_veto(stiffest: float | None) -> str | None:
+    """Return the reason why k has a lower bound alone, which is given [N/m]; None where it has none or is infinite."""
+    if stiffest is None or np.isinf(stiffest):
+        return None
+    return f"above {stiffest:.2g} N/m, and these tests show no more of it"
 
 
 def friction_scale(friction: float, force: Array) -> float:

@@ -125,7 +125,7 @@ class Kept:
             return (id(given),)
         if isinstance(given, Problem):
             rows = tuple(row.model_dump_json() for row in given.base)
-            rest = given.scales, given.largest_rate, given.reference_temperature, sorted(given.per_voltage)
+            rest = given.scales, given.reference_temperature, sorted(given.per_voltage)
             return (*map(self._said, given.observations), rows, repr(rest))
         if isinstance(given, FitResult):
             return given.damper.model_dump_json(), given.effects, given.optimum.tobytes(), repr(given.misfit)

@@ -15,6 +15,7 @@ import numpy as np
 from pzd.damper.model import Damper
 from pzd.diagnosis.fit.problem import Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
+from pzd.fit.element_coordinates import ElementCoordinates
 from pzd.fit.least_squares import Optimum, minimise
 from pzd.record import Array
 
@@ -37,19 +38,14 @@ POLISHED_OFFSET = 1e-2
 """Largest distance to the optimum of what is quoted [standard errors].
 
 Reason: of a 95 % interval of 1.96 standard errors half a hundredth, less than its second digit shows."""
-STIFFNESS_MARGIN = 2.0
-"""Factor by which the search may exceed the largest rate k/C.
-
-Reason: a margin for an optimum at the limit that identify found; these samples do not distinguish a stiffer element
-from a rigid one."""
 PRIOR_DEVIATION = 1.5
 """Prior standard deviation of ln C and ln k about their starting values: fixes a row where the tests do not show it (C
-under an open relief valve, k of a soft drive), and nowhere else.
+under an open relief valve, k of a soft drive), and nowhere else. Between values that no test shows there is none.
 
 Reason: a factor of e^1.5 = 4.5 either way is no surprise between what identify reads from loops and an optimum with an
 effect beside it."""
 LARGEST_LOG_RATIO = 3.0
-"""C and k stay within e^3 = 20 times their starting values.
+"""C and 1/k stay within e^3 = 20 times their starting values, or what no test shows; their limit zero is never barred.
 
 Reason: two standard deviations of the prior; what ends there is not shown by the tests."""
 
@@ -172,6 +168,7 @@ def _search(
     low, high = _bounds(problem, unknowns)
     begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
     start_of_rows, prior = problem.start(), _prior(problem, len(unknowns))
+    unseen = np.tile(problem.unseen, len(problem.base))
     active = sorted({j for o in problem.observations for j in active_columns(problem, unknowns, o, free)})
 
     def all_variables(x: Array) -> Array:
@@ -184,11 +181,14 @@ def _search(
         return linearise(problem, unknowns, all_variables(np.frombuffer(x)), limits)
 
     def residuals_at(x: Array) -> Array:
-        away = all_variables(x)[: start_of_rows.size] - start_of_rows
-        return np.concatenate([linearised_at(x.tobytes()).stacked, prior[:, : start_of_rows.size] @ away])
+        shown, begun = np.maximum(all_variables(x)[: start_of_rows.size], unseen), np.maximum(start_of_rows, unseen)
+        return np.concatenate([linearised_at(x.tobytes()).stacked, prior[:, : start_of_rows.size] @ (shown - begun)])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([linearised_at(x.tobytes()).jacobian.dense(active), prior[:, active]])
+        at = all_variables(x)
+        shown = np.ones(at.size)
+        shown[: unseen.size] = at[: unseen.size] > unseen
+        return np.concatenate([linearised_at(x.tobytes()).jacobian.dense(active), (prior * shown)[:, active]])
 
     found = minimise(
         residuals_at,
@@ -212,9 +212,9 @@ def _prior(problem: Problem, effects: int) -> Array:
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
     """Return the limits of the search: rows within a ratio of their start, beyond which dampers are rigid or dead."""
     start = problem.start().reshape(-1, 3)
-    low, high = start - LARGEST_LOG_RATIO, start + LARGEST_LOG_RATIO
-    low[:, 0], high[:, 0] = 0.0, 2.0
-    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFNESS_MARGIN * problem.largest_rate))
+    low, high = np.zeros_like(start), np.maximum(start, problem.unseen) + LARGEST_LOG_RATIO
+    high = np.minimum(high, np.maximum(start, problem.coordinates.high))
+    high[:, 0] = 2.0
     bounds = np.reshape([u.bounds for u in unknowns], (-1, 2))
     return np.concatenate([low.ravel(), bounds[:, 0]]), np.concatenate([high.ravel(), bounds[:, 1]])
 
@@ -252,18 +252,18 @@ def standard_errors(fitted: FitResult) -> Array:
     return np.asarray(np.abs(slopes) * _search_errors(fitted, of_effects))
 
 
-def base_half_widths(fitted: FitResult, force: float) -> Array:
-    """Compute the (b, 3) half widths of the 95 % intervals of T0, C and k of every base row, the effects free.
+def base_half_widths(fitted: FitResult, coordinates: ElementCoordinates) -> Array:
+    """Compute the (b, 3) half widths of the 95 % intervals of T0, C and 1/k of every base row, the effects free.
 
-    Equation: 1.96 s, s as in `standard_errors`; of C and k from that of their logarithm, to first order
+    Equation: 1.96 s, s as in `standard_errors`, from that of the search coordinates to first order
 
     Parameters
     ----------
     fitted : the optimum
-    force : unit of T0 in the search [N]
+    coordinates : of the search
     """
     of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
-    units = np.array([(force, row.C_Ns_per_m, row.k_N_per_m) for row in fitted.damper.base])
+    units = np.array([coordinates.slopes(row) for row in fitted.optimum[of_base].reshape(-1, 3)])
     return np.asarray(LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units)
 
 

@@ -15,6 +15,7 @@ from pzd.damper.effect import Effect, Parameter, Scales, Search
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
+from pzd.fit.element_coordinates import ElementCoordinates
 from pzd.record import Array
 
 # --- Budget of simulations
@@ -60,8 +61,9 @@ class Budget:
 # --- Unknowns and the problem
 
 
-SOFTEST = 0.1
-"""Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
+UNSEEN = (0.1, 1e-3)
+"""C [largest force over largest speed] and 1/k [range of displacement over largest force] below which the priors tell no
+values apart: hardly any damping, hardly any oil spring."""
 BOUND = 1e4
 """Limit of scaled parameters, and of the inverse of those searched by their logarithm."""
 ZERO = Parameter(
@@ -131,8 +133,6 @@ class Problem:
     base: tuple[BaseRow, ...]
     """Labels and starting values of the base rows."""
     scales: Scales
-    largest_rate: float
-    """Largest k / C that is searched [1/s]: an element that responds within a sample shows no spring."""
     reference_temperature: float | None = None
     """T_ref of the temperature drift [degC]."""
     per_voltage: frozenset[str] = frozenset()
@@ -186,12 +186,20 @@ class Problem:
         return Unknown(effect, parameter, parameter.search.scale(self.scales) or 1.0, node)
 
     def start(self) -> Array:
-        """Return the (3 b,) base rows in the units of the search: T0 / largest force, ln C, ln k."""
-        softest = SOFTEST * self.scales.force / self.scales.speed
-        damping = [max(r.C_Ns_per_m, softest) for r in self.base]
-        stiffness = [min(r.k_N_per_m, self.largest_rate * C) for r, C in zip(self.base, damping, strict=True)]
-        rows = zip(self.base, damping, stiffness, strict=True)
-        return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
+        """Return the (3 b,) base rows in the units of the search, see `pzd.fit.element_coordinates`."""
+        rows = [self.coordinates.to_search(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in self.base]
+        return np.minimum(np.concatenate(rows), np.tile((np.inf, *self.coordinates.high[1:]), len(rows)))
+
+    @cached_property
+    def coordinates(self) -> ElementCoordinates:
+        """Coordinates of T0, C and k in the search."""
+        return ElementCoordinates(self.scales.force, self.scales.speed, 2.0 * self.scales.stroke)
+
+    @cached_property
+    def unseen(self) -> Array:
+        """(3,) coordinates below which the priors tell no values apart; none of T0."""
+        force, speed, stroke = self.coordinates.force, self.coordinates.speed, self.coordinates.stroke
+        return self.coordinates.to_search(0.0, UNSEEN[0] * force / speed, force / (UNSEEN[1] * stroke))
 
     def start_with(self, damper: Damper) -> Array:
         """Return the (3 b + e,) base rows and the effects of a damper in the units of the search."""
@@ -202,7 +210,7 @@ class Problem:
         """Return the parameters at a point of the search."""
         split = 3 * len(self.base)
         base = searched[:split].reshape(-1, 3)
-        values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
+        values = np.array([self.coordinates.from_search(np.maximum(row, 0.0)) for row in base])
         effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
         zero = 0.0
         for unknown, x in zip(unknowns, searched[split:], strict=True):

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pzd.damper.confounders import known
+from pzd.damper.element import STIFFEST
 from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import nearest_row
@@ -385,8 +386,8 @@ def _perturbed_base(damper: Damper, rows: Sequence[int]) -> Iterator[tuple[Param
         row = damper.base[i]
         moved = {
             "T0_N": row.T0_N + STEP * max(row.T0_N, least, 1.0),
-            "C_Ns_per_m": row.C_Ns_per_m * (1.0 + STEP),
-            "k_N_per_m": row.k_N_per_m * (1.0 + STEP),
+            "C_Ns_per_m": max(row.C_Ns_per_m * (1.0 + STEP), STEP),
+            "k_N_per_m": min(row.k_N_per_m, STIFFEST) * (1.0 + STEP),
         }
         for name, value in moved.items():
             base = [*damper.base]
