@@ -63,7 +63,8 @@ class KneeRow(ConditionRow):
     friction_N_low95: float
     friction_N_high95: float
     gas_force_N: float
-    """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out."""
+    """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out. 0 where the tests show
+    none: then all else is fitted without it."""
     gas_force_N_low95: float
     gas_force_N_high95: float
     gas_spring_N_per_m: float
@@ -234,8 +235,8 @@ KNEES: Files = {
 def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     """Return the damper of one setting by the knee law: a base row a condition, the knee and the gas as effects.
 
-    Gas force and gas spring are left out where the interval of every condition holds zero. Effects know no temperature:
-    where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
+    Gas force and gas spring are left out where the fit of every condition went without them. Effects know no
+    temperature: where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
 
     Parameters
     ----------
@@ -255,8 +256,8 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     }
     shown = {
         "knee": True,
-        "preload_offset": any(row.gas_force_N_low95 * row.gas_force_N_high95 > 0.0 for row in rows),
-        "gas_spring": any(row.gas_spring_N_per_m_low95 * row.gas_spring_N_per_m_high95 > 0.0 for row in rows),
+        "preload_offset": any(row.gas_force_N != 0.0 for row in rows),
+        "gas_spring": any(row.gas_spring_N_per_m != 0.0 for row in rows),
     }
     given = [voltage for voltage in voltages if voltage is not None]
     return Damper(

@@ -101,16 +101,17 @@ def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
 
 
 def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array) -> Array:
-    """Compute the (n,) part explained by a test and chance near a jump [N]: with the timing where less remains with it.
+    """Compute the (n,) part explained by a test and chance near a jump [N]: where its parts leave less, with them.
 
     Parameters
     ----------
     force, predicted : (n,) [N]
     size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
     """
-    found = [part + jump_timing_error(force - part, predicted) for part in (size, size + timing)]
-    left = [np.abs(force - predicted - part) for part in found]
-    return np.where(left[0] <= left[1], *found)
+    parts = np.zeros(size.size), size, size + timing
+    found = np.stack([part + jump_timing_error(force - part, predicted) for part in parts])
+    least = np.argmin(np.abs(force - predicted - found), axis=0)
+    return np.asarray(np.take_along_axis(found, least[np.newaxis], axis=0)[0])
 
 
 def _check_cycles(

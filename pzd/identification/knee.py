@@ -17,7 +17,17 @@ from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns
-from pzd.identification.knee_fit import REFIT_EVALUATIONS, KneeData, KneeFit, descend, fit_bingham, fit_knee
+from pzd.identification.knee_fit import (
+    GAS_FORCE,
+    GAS_SPRING,
+    REFIT_EVALUATIONS,
+    KneeData,
+    KneeFit,
+    descend,
+    fit_bingham,
+    fit_knee,
+    without_gas,
+)
 from pzd.identification.prepared_record import fitted_records, prepare
 from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
@@ -56,17 +66,21 @@ def identify_knees(
     ------
     ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
     """
-    rows: list[KneeRow] = []
-    forces: list[KneeForceRow] = []
-    found = []
+    fitted: list[FittedCondition] = []
     for number, (condition, bingham) in enumerate(conditions, start=1):
         tests = KneeData.of([test for record in condition.records for test in separate_tests(record)])
         fit = fit_knee(tests, bingham.k_N_per_m or bingham.k_N_per_m_low95 or STIFF)
-        row = knee_row(condition.labels, tests, fit, config.nuisance)
-        rows.append(row)
-        forces += knee_forces(row)
-        found += held_out_predictions(condition.labels, tests, fit, fit_bingham(tests, fit))
-        progress(Progress(number, len(conditions), f"knee law: {_knee_text(row)}"))
+        fitted.append(FittedCondition.of(condition.labels, tests, fit, config.nuisance))
+        progress(Progress(number, len(conditions), f"knee law: {_knee_text(fitted[-1].row)}"))
+    for setting in dict.fromkeys(each.row.setting for each in fitted):
+        fitted = _with_gas_that_shows(fitted, setting, config.nuisance)
+    rows = [each.row for each in fitted]
+    forces = [force for row in rows for force in knee_forces(row)]
+    found = [
+        predicted
+        for each in fitted
+        for predicted in held_out_predictions(each.labels, each.tests, each.fit, fit_bingham(each.tests, each.fit))
+    ]
     laws = []
     for setting in settings:
         if config.law == "knee" and not any(row.setting == setting for row in rows):
@@ -81,6 +95,46 @@ def identify_knees(
         laws.append(law)
     clicks, units = force_changes(forces, control)
     return Knees(tuple(rows), tuple(forces), clicks, tuple(row for row, _ in found), tuple(laws), units)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCondition:
+    """The knee law fitted to one condition."""
+
+    labels: Labels
+    tests: KneeData
+    fit: KneeFit
+    row: KneeRow
+
+    @classmethod
+    def of(cls, labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> FittedCondition:
+        """Describe an optimum of one condition."""
+        return cls(labels, tests, fit, knee_row(labels, tests, fit, nuisance))
+
+
+def _with_gas_that_shows(
+    fitted: Sequence[FittedCondition], setting: str | None, nuisance: NuisanceConfig
+) -> list[FittedCondition]:
+    """Leave gas spring and gas force of a setting out where the interval of each of its conditions holds zero.
+
+    One after the other, each time with all else fitted again: what is taken out of a joint fit moves the rest.
+    """
+    fitted = list(fitted)
+    mine = [i for i, each in enumerate(fitted) if each.row.setting == setting]
+    for term in (GAS_SPRING, GAS_FORCE):
+        if any(_excludes_zero(fitted[i].row, GAS_COLUMNS[term]) for i in mine):
+            continue
+        for i in mine:
+            each = fitted[i]
+            fit = without_gas(each.tests, each.fit, term)
+            fitted[i] = FittedCondition.of(each.labels, each.tests, fit, nuisance)
+    return fitted
+
+
+def _excludes_zero(row: KneeRow, column: str) -> bool:
+    """Whether the interval of a column does not hold zero."""
+    low, high = getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95")
+    return bool(low * high > 0.0)
 
 
 def _knee_text(row: KneeRow) -> str:
@@ -104,6 +158,8 @@ TRADE_SPEEDS = tuple(float(np.round(np.pi * 0.1 * turns / 60.0, 3)) for turns in
 SPEED_ROUNDING = 1.001
 """Factor within which a test reaches a speed, which is rounded to millimetres a second."""
 NO_MISFIT = Misfit(0.0, 0.0)
+GAS_COLUMNS = ("gas_force_N", "gas_spring_N_per_m")
+"""Columns of the terms of the gas, gas force and gas spring."""
 
 
 def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> KneeRow:
@@ -129,7 +185,9 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
     cells: dict[str, float | None] = {}
     for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
         scale = "positive" if name == "friction_N" else "linear" if name.startswith("gas") else "log"
-        cells |= interval_columns(name, values.get(name), widths.get(name), scale, WIDEST_LOGARITHM)
+        left_out = name in GAS_COLUMNS and name not in widths
+        width = 0.0 if left_out else widths.get(name)
+        cells |= interval_columns(name, values.get(name), width, scale, WIDEST_LOGARITHM)
     return KneeRow.model_validate(
         {
             **label_columns(labels),
@@ -174,7 +232,7 @@ def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tup
     columns = ["friction_N", *(f"{name}_bleed_Ns_per_m" for name in DIRECTIONS), "k_N_per_m"]
     for way in form.directions_with_knee:
         columns += [f"{DIRECTIONS[way]}_knee_velocity_m_per_s", f"{DIRECTIONS[way]}_blow_off_Ns_per_m"]
-    columns += ["gas_force_N", "gas_spring_N_per_m"]
+    columns += [GAS_COLUMNS[term] for term in form.gas_terms]
     by_force, forces = fit.slopes.copy(), list(columns)
     for way in form.directions_with_knee:
         place, C = columns.index(f"{DIRECTIONS[way]}_knee_velocity_m_per_s"), curve.bleed[way]
@@ -214,7 +272,7 @@ def _status(
     weak = [
         f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
-        if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
+        if name != "gas_spring_N_per_m" and widths.get(name, 0.0) > WEAK_WIDTH * least.get(name, value)
     ]
     if not converged:
         weak.append("the least squares have not converged")
@@ -228,7 +286,7 @@ def _status(
 LAW_FOLDS = 5
 """Folds of the cross-validation of a law, or one a test where they are fewer."""
 SIGNIFICANT_ERRORS = 2.0
-"""Standard errors beyond which a mean difference is significant, as in diagnose."""
+"""Standard errors beyond which a mean is significant, as in diagnose; of few tests more, as Student's t has it."""
 FEWEST_TESTS = 3
 """Fewest tests for a standard error."""
 
@@ -278,8 +336,10 @@ def law_row(
 ) -> LawRow:
     """Choose the law of one setting.
 
-    Equation: knee where mean d > 2 s_d / sqrt(n), d_i = W_s,i of Bingham less that of the knee, and where the error
-    over all tests is visibly less                                                   Source: paired differences
+    Equation: knee where mean d > t s_d / sqrt(n), d_i = ln((e_B,i + e_0,i) / (e_K,i + e_0,i)), P(t_(n-1) < t) =
+    P(z < 2), e the squared errors of either law and e_0 those that do not show, and where the error over all is visibly
+    less; of ratios, so that each test counts alike and no slow one rules
+                                                                        Source: Student 1908, paired differences
 
     Parameters
     ----------
@@ -306,14 +366,32 @@ def law_row(
         reason = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; "
         reason += "record several in a condition"
     else:
-        apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
-        mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
+        mean, least = _mean_log_ratio(np.array([each for _, each in found]))
         visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
-        law = "knee" if mean > SIGNIFICANT_ERRORS * error and visible else "bingham"
-        reason = f"{comparison}; mean difference {mean:.2g}, its standard error {error:.2g}"
-        reason += "" if visible or mean <= 0.0 else f", less than {MISFIT_THRESHOLD:.2%} of peak"
+        law = "knee" if mean > least and visible else "bingham"
+        better = sum(row.W_s_knee < row.W_s_bingham for row, _ in found)
+        reason = (
+            f"{comparison}; better in {better} of {count}, by {np.exp(mean):.3g} in the geometric mean where chance "
+        )
+        reason += f"makes up to {np.exp(least):.3g}"
+        reason += "" if visible or mean <= 0.0 else f", and by less than {MISFIT_THRESHOLD:.2%} of peak"
     bingham, knee = pooled or (None, None)
     return LawRow(setting=setting, law=law, tests=count, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
+
+
+def _mean_log_ratio(squares: Array) -> tuple[float, float]:
+    """Compute the mean log ratio of the errors of both laws over the tests, and what chance makes it at most.
+
+    Parameters
+    ----------
+    squares : (n, 4) of `held_out_predictions`
+    """
+    from scipy.special import ndtr, stdtrit
+
+    bingham, knee, _, unseen = squares.T
+    ratios = np.log((bingham + unseen) / (knee + unseen))
+    errors = float(stdtrit(len(ratios) - 1, ndtr(SIGNIFICANT_ERRORS)))
+    return float(ratios.mean()), errors * float(np.std(ratios, ddof=1) / np.sqrt(len(ratios)))
 
 
 # --- Force per click and per unit ---

@@ -7,7 +7,7 @@ Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import NamedTuple
@@ -28,6 +28,8 @@ from pzd.signals.measures import criterion, rms
 
 REBOUND, COMPRESSION = 0, 1
 """Directions: indices of every pair."""
+GAS_FORCE, GAS_SPRING = 0, 1
+"""Terms of the gas: F_0 and k_g."""
 
 
 class KneeCurve(NamedTuple):
@@ -73,6 +75,13 @@ class KneeForm:
     """Whether both directions share one bleed and have no knee: the Bingham element."""
     has_knee: tuple[bool, bool] = (True, True)
     """Whether rebound and compression have a knee."""
+    has_gas: tuple[bool, bool] = (True, True)
+    """Whether there is a gas force F_0, and a gas spring k_g."""
+
+    @property
+    def gas_terms(self) -> list[int]:
+        """Columns of the forces of the gas that are free."""
+        return [term for term, each in enumerate(self.has_gas) if each]
 
     @property
     def directions_with_knee(self) -> tuple[int, ...]:
@@ -283,7 +292,7 @@ class KneeFit:
     residuals: Array
     """(N,) measured less simulated force [N]."""
     slopes: Array
-    """(N, p + 2) derivatives of the force by the natural parameters of the form, by F_0 and by k_g."""
+    """(N, p + g) derivatives of the force by the natural parameters of the form, and by its terms of the gas."""
     criterion: float
     converged: bool
     """Whether the residuals are orthogonal to the slopes as far as their own size can tell."""
@@ -304,7 +313,7 @@ def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
     best = descend(tests, KneeForm(), *grid_start(tests, stiffness))
     for direction in best.form.directions_with_knee:
         has_knee = tuple(each and other != direction for other, each in enumerate(best.form.has_knee))
-        form = KneeForm(has_knee=(has_knee[0], has_knee[1]))
+        form = replace(best.form, has_knee=(has_knee[0], has_knee[1]))
         straight = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
         if not _knee_is_visible(tests, best, straight):
             best = descend(tests, form, straight.curve, straight.gas)
@@ -315,7 +324,14 @@ def fit_bingham(tests: KneeData, start: KneeFit) -> KneeFit:
     """Fit one T0 and C with gas force, gas spring and oil spring: the alternative law to the knee."""
     slope = 0.25 * sum((*start.curve.bleed, *start.curve.blow_off))
     begin = start.curve._replace(bleed=(slope, slope))
-    return descend(tests, BINGHAM_FORM, begin, start.gas)
+    return descend(tests, replace(BINGHAM_FORM, has_gas=start.form.has_gas), begin, start.gas)
+
+
+def without_gas(tests: KneeData, fit: KneeFit, term: int) -> KneeFit:
+    """Fit the law again with `GAS_FORCE` or `GAS_SPRING` left out, which moves all else."""
+    force, spring = (each and term != other for other, each in enumerate(fit.form.has_gas))
+    gas = np.where((force, spring), fit.gas, 0.0)
+    return descend(tests, replace(fit.form, has_gas=(force, spring)), fit.curve, gas)
 
 
 def _knee_is_visible(tests: KneeData, has_knee: KneeFit, straight: KneeFit) -> bool:
@@ -338,22 +354,22 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
     gas : (2,) F_0 and k_g in the first force of a test; its effect is over before the counted samples
     evaluations : largest number
     """
-    basis, _ = np.linalg.qr(tests.gas_columns)
+    basis, _ = np.linalg.qr(tests.gas_columns[:, form.gas_terms])
     norm, peak = float(np.linalg.norm(tests.measured)), tests.peak
 
-    def without_gas(values: Array) -> Array:
+    def projected(values: Array) -> Array:
         return np.asarray(values - basis @ (basis.T @ values))
 
     def simulated(x: Array) -> Array:
         return tests.simulated(form.found(x, peak), gas)
 
     def residuals(x: Array) -> Array:
-        return without_gas(tests.measured - simulated(x)) / norm
+        return projected(tests.measured - simulated(x)) / norm
 
     def slopes(x: Array) -> Array:
         at = simulated(x)
         steps = DIFFERENCE * np.eye(x.size)
-        return without_gas(-np.column_stack([(simulated(x + step) - at) / DIFFERENCE for step in steps])) / norm
+        return projected(-np.column_stack([(simulated(x + step) - at) / DIFFERENCE for step in steps])) / norm
 
     low, high = _search_bounds(tests, form)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
@@ -369,7 +385,8 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
     )
     curve = form.found(found.x, peak)
     left = tests.measured - tests.simulated(curve, gas)
-    of_gas = np.asarray(np.linalg.lstsq(tests.gas_columns, left, rcond=None)[0])
+    of_gas = np.zeros(2)
+    of_gas[form.gas_terms] = np.linalg.lstsq(tests.gas_columns[:, form.gas_terms], left, rcond=None)[0]
     left = left - tests.gas_columns @ of_gas
     slopes_at_optimum = _natural_slopes(tests, form, curve, of_gas)
     return KneeFit(form, curve, of_gas, left, slopes_at_optimum, criterion(left, tests.measured), found.converged)
@@ -388,7 +405,7 @@ def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
 
 
 def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
-    """Return the derivatives (N, p + 2) of the force by the natural parameters, F_0 and k_g."""
+    """Return the derivatives (N, p + g) of the force by the natural parameters and the g free terms of the gas."""
     natural = form.natural(curve)
     steps = DIFFERENCE * np.where(natural > 0.0, natural, tests.peak)
     at = tests.simulated(curve, gas)
@@ -396,4 +413,4 @@ def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Arra
         (tests.simulated(form.curve(natural + step * unit), gas) - at) / step
         for step, unit in zip(steps, np.eye(natural.size), strict=True)
     ]
-    return np.column_stack([*moved, tests.gas_columns])
+    return np.column_stack([*moved, tests.gas_columns[:, form.gas_terms]])

@@ -14,7 +14,7 @@ from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
 from pzd.signals.measures import rms
 from pzd.signals.noise import pure_error, repeatable_power
-from pzd.signals.nuisance import NUISANCE_LIMIT
+from pzd.signals.nuisance import NUISANCE_LIMIT, reducing_share
 
 # --- Status of a row ---
 
@@ -381,10 +381,15 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
 
 
 def _without_explained(record: FittedRecord, explained: Array) -> Array:
-    """Return the residual (m,) less the explained part, and less the timing of jumps, which is chance."""
-    left = record.residuals - explained
+    """Return the residual (m,) less the explained part, and less the timing of jumps, which is chance.
+
+    Beside a jump no sample entered the estimate: there what is explained counts where it leaves less.
+    """
+    explained = reducing_share(record.residuals[record.calm], explained[record.calm]) * explained
     predicted = record.force - record.residuals
-    return left - np.where(record.calm, 0.0, jump_timing_error(predicted + left, predicted))
+    left = record.residuals - explained
+    beside = [each - jump_timing_error(predicted + each, predicted) for each in (record.residuals, left)]
+    return np.where(record.calm, left, np.where(np.abs(beside[0]) <= np.abs(beside[1]), *beside))
 
 
 def _noise_variance(record: FittedRecord) -> float:

@@ -65,8 +65,27 @@ def nuisance_forces(
     normal = kept.T @ kept / weight + np.eye(columns.shape[1])
     estimate = np.linalg.solve(normal, kept.T @ residual[calm] / weight)
     within = np.clip(estimate, -NUISANCE_LIMIT, NUISANCE_LIMIT)
+    within *= reducing_share(residual[calm], kept @ within)
     of_size, of_timing = slice(FIRST_TIMING_COLUMN), slice(FIRST_TIMING_COLUMN, None)
     return columns[:, of_size] @ within[of_size], columns[:, of_timing] @ within[of_timing]
+
+
+def reducing_share(residual: Array, explained: Array) -> float:
+    """Return the share, 0 to 1, of an explanation (m,) of a residual (m,) that leaves least of it.
+
+    A bounded estimate may be bounded away from where it helps; an explanation that may only reduce never grows.
+
+    Equation: min over 0 <= s <= 1 of |r - s e|^2
+
+    Examples
+    --------
+    >>> reducing_share(np.array([1.0, 1.0]), np.array([4.0, 4.0]))
+    0.25
+    >>> reducing_share(np.array([1.0, 1.0]), np.array([-1.0, -1.0]))
+    0.0
+    """
+    power = float(explained @ explained)
+    return float(np.clip(residual @ explained / power, 0.0, 1.0)) if power > 0.0 else 1.0
 
 
 def nuisance_columns(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:
