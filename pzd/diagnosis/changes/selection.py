@@ -1,0 +1,217 @@
+"""Which changes explain the difference: forward selection with exchange, support of each, and rivals.
+
+A step adopts the change that lowers the Bayesian criterion most; then each adopted one is left out, or put in the place
+of another, until nothing improves. A linearised step tells beforehand which candidates are worth a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pzd.diagnosis.changes.candidates import Candidate, excludes
+from pzd.diagnosis.changes.regression import Fitted, Regression, Scatter, coordinates_of
+from pzd.record import Array
+
+MOST_CHANGES = 4
+"""Changes at once."""
+FITTED = 5
+"""Candidates that are fitted in a step, of those that promise most."""
+SLACK = 30.0
+"""A candidate whose promised criterion is worse than the best by more is not fitted: the promise is linearised."""
+EXCHANGES = 6
+"""Rounds of the exchange at most; each lowers the criterion."""
+BETTER = 1e-3
+"""Least improvement of the criterion: of two candidates that do the same the first in the list stays."""
+FOLDS = 5
+"""Parts into which the tests are dealt for the prediction of held-out ones."""
+SMALL_START = 0.1
+"""Share of the way from neutral at which an effect is tried as well, since a large one may promise nothing."""
+
+
+@dataclass(eq=False)
+class Search:
+    """Search for the changes that explain the difference of force."""
+
+    regression: Regression
+    candidates: Sequence[Candidate]
+    adopt_bic: float
+    rival_bic: float
+    visible: float
+    """Least r.m.s. force of a change, as a share of each test's peak."""
+    _starts: dict[Candidate, list[tuple[Array, Array, list[Array]]]] = field(default_factory=dict, repr=False)
+    _fits: dict[frozenset[Candidate], Fitted] = field(default_factory=dict, repr=False)
+
+    def nothing(self) -> Fitted:
+        """Return the fit without any change."""
+        return self._fit((), np.zeros(0), Scatter(0.3, 1e-2))
+
+    def _fit(self, candidates: Sequence[Candidate], start: Array, scatter: Scatter) -> Fitted:
+        key = frozenset(candidates)
+        if key not in self._fits:
+            self._fits[key] = self.regression.fit(candidates, start, scatter)
+        return self._fits[key]
+
+    # --- What a candidate promises
+
+    def _promising(self, before: Fitted, tried: Iterable[Candidate]) -> list[tuple[float, Candidate, Array]]:
+        """Return the candidates with the change of the criterion that each promises and its start, best first."""
+        likelihood = self.regression.likelihood
+        whiteners = likelihood.whiteners(before.scatter)
+        r = np.concatenate([W @ each for W, each in zip(whiteners, before.residuals, strict=True)])
+        frame = np.zeros((r.size, 0))
+        if before.coordinates:
+            frame = np.linalg.qr(self.regression.jacobian(before.coordinates, before.values, whiteners)).Q
+        r = r - frame @ (frame.T @ r)
+        found = []
+        for candidate in tried:
+            best, at = np.inf, np.zeros(len(candidate.coordinates))
+            for start, secant, columns in self._linearised(candidate):
+                own = np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)])
+                own = own - frame @ (frame.T @ own)
+                size = np.linalg.norm(own, axis=0)
+                own = own / np.where(size > 0.0, size, 1.0)
+                if not np.all(np.isfinite(own)):
+                    continue
+                solved = np.linalg.lstsq(own, r, rcond=1e-6)[0]
+                left = r - own @ solved
+                # The likeliest scale of the scatter goes with what is left, so a drop counts by its logarithm.
+                drop = r.size * float(np.log(max(left @ left, 1e-12) / max(r @ r, 1e-12)))
+                if drop < best:
+                    best = drop
+                    at = start if not secant.size else start
+            found.append((best + len(candidate.coordinates) * float(np.log(likelihood.size)), candidate, at))
+        return sorted(found, key=lambda each: each[0])
+
+    def _linearised(self, candidate: Candidate) -> list[tuple[Array, Array, list[Array]]]:
+        """Return the starts of a candidate, each with the columns of its differences beside the first state."""
+        if candidate not in self._starts:
+            made = []
+            coordinates = candidate.coordinates
+            for start in candidate.starts:
+                x = np.array(start)
+                columns = self.regression.columns(coordinates, x)
+                secant = self.regression.response.of(coordinates, x.tolist())
+                if any(np.any(s != 0.0) for s in secant):
+                    columns = [np.column_stack([s, c]) for s, c in zip(secant, columns, strict=True)]
+                made.append((x, np.zeros(0), columns))
+            self._starts[candidate] = made
+        return self._starts[candidate]
+
+    def _with(self, before: Fitted, promised: tuple[float, Candidate, Array]) -> Fitted:
+        _, candidate, start = promised
+        together = (*before.candidates, candidate)
+        return self._fit(together, np.concatenate([before.values, start]), before.scatter)
+
+    def _tried(self, before: Fitted) -> list[Candidate]:
+        return [c for c in self.candidates if not any(excludes(c, adopted) for adopted in before.candidates)]
+
+    def _best_addition(self, before: Fitted) -> Fitted | None:
+        promising = self._promising(before, self._tried(before))
+        worth = [p for p in promising[:FITTED] if p[0] < promising[0][0] + SLACK]
+        fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._visible(fitted, fitted.candidates[-1])]
+        return min(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"), default=None)
+
+    # --- The steps
+
+    def run(self) -> Fitted:
+        """Adopt changes one by one, with exchange, as long as the criterion falls by enough."""
+        best = self.nothing()
+        while len(best.candidates) < MOST_CHANGES:
+            more = self._best_addition(best)
+            if more is None or more.bic - best.bic > self.adopt_bic:
+                break
+            best = self._exchanged(more)
+        return self._without_superfluous(best)
+
+    def _exchanged(self, best: Fitted) -> Fitted:
+        """Put other candidates in the place of each adopted one until nothing improves."""
+        for _ in range(EXCHANGES):
+            tried = [self._best_addition(self.without(best, c)) for c in best.candidates]
+            better = min((t for t in tried if t is not None), key=lambda f: f.bic, default=best)
+            if better.bic > best.bic - BETTER - 1e-6 * abs(best.bic):
+                return best
+            best = better
+        return best
+
+    def _without_superfluous(self, best: Fitted) -> Fitted:
+        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence."""
+        while best.candidates:
+            fewer = [(self.without(best, c), c) for c in best.candidates]
+            doubtful = [
+                less
+                for less, c in fewer
+                if best.bic - less.bic > self.adopt_bic or not self._visible(best, c) or not self._predicts(best, c)
+            ]
+            if not doubtful:
+                return best
+            best = min(doubtful, key=lambda f: f.bic)
+        return best
+
+    def without(self, fitted: Fitted, candidate: Candidate) -> Fitted:
+        """Return the fit without one of its changes, the others fitted again."""
+        kept = tuple(c for c in fitted.candidates if c is not candidate)
+        start = np.concatenate([fitted.values_of(c) for c in kept]) if kept else np.zeros(0)
+        return self._fit(kept, start, fitted.scatter)
+
+    def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
+        return self.size_of(fitted, candidate) >= self.visible
+
+    def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
+        """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
+        coordinates = fitted.coordinates
+        off = [0.0 if c in candidate.coordinates else float(x) for c, x in zip(coordinates, fitted.values, strict=True)]
+        kept = [(c, x) for c, x in zip(coordinates, off, strict=True) if c not in candidate.coordinates]
+        others = self.regression.response.of([c for c, _ in kept], [x for _, x in kept])
+        squares = [
+            float(np.sum((d - o) ** 2)) / c.peak**2
+            for c, d, o in zip(self.regression.comparisons, fitted.differences, others, strict=True)
+        ]
+        return float(np.sqrt(np.mean(squares)))
+
+    def _predicts(self, fitted: Fitted, candidate: Candidate) -> bool:
+        """Whether held-out tests are predicted better with a change than without, the rest fitted alike.
+
+        To first order about the optimum; a coordinate that the other tests do not show is left out of the count.
+        """
+        tests = len(self.regression.comparisons)
+        if tests < 2 or candidate.per_voltage:
+            return True
+        whiteners = self.regression.likelihood.whiteners(fitted.scatter)
+        columns = self.regression.columns(fitted.coordinates, fitted.values)
+        J = [W @ c for W, c in zip(whiteners, columns, strict=True)]
+        target = [
+            W @ r + own @ fitted.values for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)
+        ]
+        kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
+        gain = 0.0
+        for fold in range(min(FOLDS, tests)):
+            held = [i for i in range(tests) if i % FOLDS == fold]
+            seen = [i for i in range(tests) if i % FOLDS != fold]
+            A, b = np.concatenate([J[i] for i in seen]), np.concatenate([target[i] for i in seen])
+            B, y = np.concatenate([J[i] for i in held]), np.concatenate([target[i] for i in held])
+            full = y - B @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
+            less = y - B[:, kept] @ np.linalg.lstsq(A[:, kept], b, rcond=1e-10)[0] if kept.any() else y
+            gain += float(less @ less - full @ full)
+        return gain > 0.0
+
+    def rivals(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
+        """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
+        less = self.without(best, candidate)
+        tried = [c for c in self._tried(less) if c.name != candidate.name]
+        promising = [p for p in self._promising(less, tried)[: 2 * FITTED]]
+        found = []
+        for p in promising:
+            if p[0] + less.bic > best.bic + self.rival_bic + SLACK:
+                continue
+            fitted = self._with(less, p)
+            if fitted.bic <= best.bic + self.rival_bic:
+                found.append(fitted)
+        return found
+
+
+def start_of(candidates: Sequence[Candidate]) -> Array:
+    """Return (p,) zeros: the start of a fit from nothing changed."""
+    return np.zeros(len(coordinates_of(candidates)))
