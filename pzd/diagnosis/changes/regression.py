@@ -1,7 +1,7 @@
 """Fit of changes to the difference of force: noise, what the tests differ by themselves, and least squares.
 
 The covariance of a stacked difference has three parts: noise from the cycles; offset, gain and delay that any test has
-of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the force in every
+of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the difference in every
 octave. Both shares are estimated with the changes, so that a difference without a name is not taken for one that has.
 
 Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s) + u^2 A A'
@@ -18,7 +18,7 @@ import numpy as np
 
 from pzd.diagnosis.changes.candidates import Candidate, Coordinate, Response
 from pzd.diagnosis.changes.pairs import Comparison, octave_mean, stacked
-from pzd.record import Array
+from pzd.record import Array, Complex
 from pzd.signals.nuisance import NuisanceConfig
 
 USUAL_SHARE = 0.3
@@ -29,8 +29,10 @@ SHARE_SCATTER = 0.4
 """Standard deviation of the logarithm of that share from stand to stand: the whole prior lies three of them away."""
 SHARES = (0.1, 0.17, 0.3, 0.5, 0.75, 1.0)
 """Shares that are tried."""
-DISCREPANCIES = tuple(float(x) for x in np.geomspace(3e-5, 0.3, 25))
-"""Shares of the force without a name that are tried, from nothing to a third."""
+DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
+"""Shares of the difference without a name that are tried, from nothing to all of it."""
+LEAST_VARIANCE = 1e-10
+"""Variance of every number besides, as a share of the square of the peak force: 1e-5 of it, the error of a simulation."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
@@ -46,7 +48,7 @@ class Scatter:
     tests: float
     """u: of the priors on offset, gain and delay."""
     discrepancy: float
-    """g: of the force, what no candidate explains."""
+    """g: of the difference, what no candidate explains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +66,9 @@ class Likelihood:
         return sum(c.difference.size for c in self.comparisons)
 
     @cached_property
-    def _shapes(self) -> tuple[Array, ...]:
-        """(2 H + 1,) mean square of the force in the octave about every harmonic [N^2]."""
-        found = []
-        for c in self.comparisons:
-            power = octave_mean(np.abs(c.reference) ** 2)
-            found.append(np.concatenate([power, power[1:]]))
-        return tuple(found)
+    def _shapes(self) -> tuple[tuple[Array, Array], ...]:
+        """(2 H + 1,) mean square of difference and force in the octave about every harmonic [N^2]."""
+        return tuple((_by_octave(c.measured - c.reference), _by_octave(c.reference)) for c in self.comparisons)
 
     @cached_property
     def columns(self) -> tuple[Array, ...]:
@@ -86,10 +84,11 @@ class Likelihood:
 
     def diagonal(self, at: int, scatter: Scatter) -> Array:
         """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
-        c = self.comparisons[at]
-        missed = scatter.discrepancy**2 + (self.known_discrepancy**2 if c.before is None else 0.0)
-        least = 1e-12 * c.peak**2
-        return c.variance + missed * self._shapes[at] + least
+        c, (difference, force) = self.comparisons[at], self._shapes[at]
+        missed = scatter.discrepancy**2 * difference
+        if c.before is None:
+            missed = missed + self.known_discrepancy**2 * force
+        return np.asarray(c.variance + missed + LEAST_VARIANCE * c.peak**2)
 
     def deviance(self, residuals: Sequence[Array], scatter: Scatter) -> float:
         """Return -2 ln L of (2 H + 1,) residuals, up to a constant, with the prior on how tests differ."""
@@ -118,6 +117,12 @@ class Likelihood:
             V = np.diag(self.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T
             found.append(np.linalg.inv(np.linalg.cholesky(V)))
         return found
+
+
+def _by_octave(spectrum: Complex) -> Array:
+    """Return the (2 H + 1,) mean square of a spectrum in the octave about every harmonic."""
+    power = octave_mean(np.abs(spectrum) ** 2)
+    return np.concatenate([power, power[1:]])
 
 
 @dataclass(frozen=True, eq=False)

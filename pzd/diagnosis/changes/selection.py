@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pzd.diagnosis.changes.candidates import Candidate, excludes
-from pzd.diagnosis.changes.regression import Fitted, Regression, Scatter, coordinates_of
+from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
+from pzd.diagnosis.fit.least_squares import projected_out
 from pzd.record import Array
 
 MOST_CHANGES = 4
@@ -27,8 +28,17 @@ BETTER = 1e-3
 """Least improvement of the criterion: of two candidates that do the same the first in the list stays."""
 FOLDS = 5
 """Parts into which the tests are dealt for the prediction of held-out ones."""
-SMALL_START = 0.1
-"""Share of the way from neutral at which an effect is tried as well, since a large one may promise nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What one linearised step towards a candidate would leave."""
+
+    criterion: float
+    """Sum of squares in units of the scatter, with the penalty on its coordinates."""
+    candidate: Candidate
+    start: Array
+    """From which it was taken."""
 
 
 @dataclass(eq=False)
@@ -41,12 +51,12 @@ class Search:
     rival_bic: float
     visible: float
     """Least r.m.s. force of a change, as a share of each test's peak."""
-    _starts: dict[Candidate, list[tuple[Array, Array, list[Array]]]] = field(default_factory=dict, repr=False)
+    _starts: dict[Candidate, list[tuple[Array, list[Array]]]] = field(default_factory=dict, repr=False)
     _fits: dict[frozenset[Candidate], Fitted] = field(default_factory=dict, repr=False)
 
     def nothing(self) -> Fitted:
         """Return the fit without any change."""
-        return self._fit((), np.zeros(0), Scatter(0.3, 1e-2))
+        return self._fit((), np.zeros(0), Scatter(USUAL_SHARE, 1.0))
 
     def _fit(self, candidates: Sequence[Candidate], start: Array, scatter: Scatter) -> Fitted:
         key = frozenset(candidates)
@@ -56,37 +66,32 @@ class Search:
 
     # --- What a candidate promises
 
-    def _promising(self, before: Fitted, tried: Iterable[Candidate]) -> list[tuple[float, Candidate, Array]]:
-        """Return the candidates with the change of the criterion that each promises and its start, best first."""
-        likelihood = self.regression.likelihood
-        whiteners = likelihood.whiteners(before.scatter)
+    def _promising(self, before: Fitted, tried: Iterable[Candidate], scatter: Scatter) -> list[Promise]:
+        """Return what one linearised step from each candidate's best start would leave, the best first."""
+        whiteners = self.regression.likelihood.whiteners(scatter)
         r = np.concatenate([W @ each for W, each in zip(whiteners, before.residuals, strict=True)])
         frame = np.zeros((r.size, 0))
         if before.coordinates:
             frame = np.linalg.qr(self.regression.jacobian(before.coordinates, before.values, whiteners)).Q
-        r = r - frame @ (frame.T @ r)
+        r = projected_out(frame, r)
         found = []
         for candidate in tried:
-            best, at = np.inf, np.zeros(len(candidate.coordinates))
-            for start, secant, columns in self._linearised(candidate):
-                own = np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)])
-                own = own - frame @ (frame.T @ own)
+            best, at = float(r @ r), np.array(candidate.starts[0])
+            for start, columns in self._linearised(candidate):
+                own = projected_out(frame, np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)]))
                 size = np.linalg.norm(own, axis=0)
                 own = own / np.where(size > 0.0, size, 1.0)
                 if not np.all(np.isfinite(own)):
                     continue
-                solved = np.linalg.lstsq(own, r, rcond=1e-6)[0]
-                left = r - own @ solved
-                # The likeliest scale of the scatter goes with what is left, so a drop counts by its logarithm.
-                drop = r.size * float(np.log(max(left @ left, 1e-12) / max(r @ r, 1e-12)))
-                if drop < best:
-                    best = drop
-                    at = start if not secant.size else start
-            found.append((best + len(candidate.coordinates) * float(np.log(likelihood.size)), candidate, at))
-        return sorted(found, key=lambda each: each[0])
+                left = r - own @ np.linalg.lstsq(own, r, rcond=1e-6)[0]
+                if left @ left < best:
+                    best, at = float(left @ left), start
+            penalty = len(candidate.coordinates) * float(np.log(self.regression.likelihood.size))
+            found.append(Promise(best + penalty, candidate, at))
+        return sorted(found, key=lambda promise: promise.criterion)
 
-    def _linearised(self, candidate: Candidate) -> list[tuple[Array, Array, list[Array]]]:
-        """Return the starts of a candidate, each with the columns of its differences beside the first state."""
+    def _linearised(self, candidate: Candidate) -> list[tuple[Array, list[Array]]]:
+        """Return the starts of a candidate with the columns of its differences there, from the first state."""
         if candidate not in self._starts:
             made = []
             coordinates = candidate.coordinates
@@ -96,21 +101,19 @@ class Search:
                 secant = self.regression.response.of(coordinates, x.tolist())
                 if any(np.any(s != 0.0) for s in secant):
                     columns = [np.column_stack([s, c]) for s, c in zip(secant, columns, strict=True)]
-                made.append((x, np.zeros(0), columns))
+                made.append((x, columns))
             self._starts[candidate] = made
         return self._starts[candidate]
 
-    def _with(self, before: Fitted, promised: tuple[float, Candidate, Array]) -> Fitted:
-        _, candidate, start = promised
-        together = (*before.candidates, candidate)
-        return self._fit(together, np.concatenate([before.values, start]), before.scatter)
+    def _with(self, before: Fitted, promise: Promise) -> Fitted:
+        together = (*before.candidates, promise.candidate)
+        return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
 
     def _tried(self, before: Fitted) -> list[Candidate]:
         return [c for c in self.candidates if not any(excludes(c, adopted) for adopted in before.candidates)]
 
     def _best_addition(self, before: Fitted) -> Fitted | None:
-        promising = self._promising(before, self._tried(before))
-        worth = [p for p in promising[:FITTED] if p[0] < promising[0][0] + SLACK]
+        worth = self._promising(before, self._tried(before), before.scatter)[:FITTED]
         fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._visible(fitted, fitted.candidates[-1])]
         return min(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"), default=None)
 
@@ -201,17 +204,8 @@ class Search:
         """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
         less = self.without(best, candidate)
         tried = [c for c in self._tried(less) if c.name != candidate.name]
-        promising = [p for p in self._promising(less, tried)[: 2 * FITTED]]
-        found = []
-        for p in promising:
-            if p[0] + less.bic > best.bic + self.rival_bic + SLACK:
-                continue
-            fitted = self._with(less, p)
-            if fitted.bic <= best.bic + self.rival_bic:
-                found.append(fitted)
-        return found
-
-
-def start_of(candidates: Sequence[Candidate]) -> Array:
-    """Return (p,) zeros: the start of a fit from nothing changed."""
-    return np.zeros(len(coordinates_of(candidates)))
+        own = self._promising(less, [candidate], best.scatter)[0]
+        limit = own.criterion + self.rival_bic + SLACK
+        promising = [p for p in self._promising(less, tried, best.scatter) if p.criterion < limit][: 2 * FITTED]
+        fits = [self._with(less, p) for p in promising]
+        return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic]
