@@ -69,20 +69,6 @@ class Unchanged(_Keyed):
     at_voltage_V: tuple[float, ...] | None = None
 
 
-class TradeRow(Frozen):
-    """Peak force over peak velocity of one motion, before and after, in both directions."""
-
-    record_before: str
-    record_after: str
-    voltage_V: float | None
-    velocity_m_per_s: float = Field(gt=0.0)
-    """Peak speed."""
-    rebound_before_N: float
-    rebound_after_N: float
-    compression_before_N: float
-    compression_after_N: float
-
-
 class Changes(_Keyed):
     """What changed between two states of a damper, how sure that is, and what cannot be told apart."""
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from pzd.damper.compose import respond
 from pzd.damper.confounders import known
-from pzd.damper.effect import NODE_VOLTAGES, Parameter, Scales
+from pzd.damper.effect import Parameter, Scales
 from pzd.damper.effects import library
 from pzd.damper.fitted_laws import fitted_laws
-from pzd.damper.model import BaseRow, Damper
+from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
 from pzd.diagnosis.fit.problem import BOUND
@@ -35,6 +35,9 @@ LEAST_FRICTION = 0.01
 """Share of the peak force from which T0 changes in proportion to itself; a smaller one in that of the peak force."""
 LARGEST_RATIO = 3.0
 """C and k change by up to e^3 = 20 times: beyond, they are not shown by the tests."""
+FRICTION_STARTS = (0.0, -0.7, 1.5)
+RATIO_STARTS = (0.0, -1.2, 1.2)
+"""Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
 TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
@@ -72,7 +75,7 @@ class Coordinate:
     logarithmic: bool = False
     """Whether the coordinate is the logarithm of the ratio to `start`."""
     start: float = 0.0
-    """Value at coordinate 0: that of the first state, or the scale of the search of a logarithmic one that is absent."""
+    """Value at coordinate 0: that of the first state, or the scale of the search where that is absent."""
     absent: bool = False
     """Whether the first state has it not, so that a logarithmic coordinate of 0 is a change."""
 
@@ -150,13 +153,11 @@ class FirstState:
         if c.logarithmic:
             return row.model_copy(update={column: value * float(np.exp(x))})
         share = value if value > LEAST_FRICTION * self.force or c.node is None else self.force
-        if c.node is None and all(r.T0_N <= LEAST_FRICTION * self.force for r in self.damper.base):
+        if c.node is None and all(LEAST_FRICTION * self.force >= r.T0_N for r in self.damper.base):
             share = self.force
         return row.model_copy(update={column: max(value + x * share, 0.0)})
 
-    def _move_effect(
-        self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float
-    ) -> None:
+    def _move_effect(self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float) -> None:
         parameter = known_parameter(c.name, c.parameter)
         own = effects.setdefault(c.name, {p.name: p.neutral for p in known_effect(c.name).parameters})
         present = own.get(c.parameter, parameter.neutral)
@@ -165,9 +166,10 @@ class FirstState:
             return
         own[c.parameter] = parameter_value(c, x)
 
-    def element(self, voltage: float | None, temperature: float | None) -> Array:
-        """Return (3,) T0 [N], C [N s/m] and k [N/m]."""
-        return element_of(self.damper, voltage, temperature)
+    def is_natural(self, coordinates: Sequence[Coordinate], values: Sequence[float]) -> bool:
+        """Whether the effects that changed have physical values, as far as those of the first state had."""
+        before = against_nature(without_laws(self.damper))
+        return set(against_nature(without_laws(self.changed(coordinates, values, None)))) <= set(before)
 
 
 def element_of(damper: Damper, voltage: float | None, temperature: float | None) -> Array:
@@ -175,6 +177,11 @@ def element_of(damper: Damper, voltage: float | None, temperature: float | None)
     if temperature is None and len({row.temperature_degC for row in damper.base}) > 1:
         temperature = float(np.median([row.temperature_degC or 0.0 for row in damper.base]))
     return np.asarray(bingham_parameters(damper, voltage, temperature)[0])
+
+
+def without_laws(damper: Damper) -> Damper:
+    """Return a damper without the laws in the place of T0 and C, of which no values are against nature."""
+    return damper.without_effects(*fitted_laws())
 
 
 def known_effect(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN201
@@ -229,10 +236,11 @@ def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Ca
     for name, unit in ELEMENT_UNITS.items():
         low, high = (-np.inf, np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
         whole = Coordinate(name, name, "damper", unit, 1.0, None, low, high, name != "T0")
-        found.append(Candidate(name, "damper", (whole,), ((0.0,),)))
+        starts = FRICTION_STARTS if name == "T0" else RATIO_STARTS
+        found.append(Candidate(name, "damper", (whole,), tuple((x,) for x in starts)))
         if len(compared) > 1:
             nodes = tuple(replace(whole, node=node) for node in compared)
-            found.append(Candidate(name, "damper", nodes, ((0.0,) * len(nodes),)))
+            found.append(Candidate(name, "damper", nodes, tuple((x,) * len(nodes) for x in starts)))
     return found
 
 
@@ -272,15 +280,13 @@ def _absent(first: FirstState, name: str) -> Candidate:
             least, most = p.search.within
             limits = max(low, least, -BOUND) - neutral / scale, min(high, most, BOUND) - neutral / scale
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, neutral, True))
-    starts = []
-    for given in itertools.product(*(p.search.starts for p in known_effect(name).parameters)):
-        starts.append(
-            tuple(
-                float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
-                for c, x in zip(coordinates, given, strict=True)
-            )
-        )
-    return Candidate(name, "damper", tuple(coordinates), tuple(starts), absent=True)
+
+    def searched(c: Coordinate, x: float) -> float:
+        return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
+
+    grid = itertools.product(*(p.search.starts for p in known_effect(name).parameters))
+    starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
+    return Candidate(name, "damper", tuple(coordinates), starts, absent=True)
 
 
 def _present(first: FirstState, name: str) -> list[Candidate]:

@@ -8,7 +8,9 @@ from typing import Literal, cast
 
 import numpy as np
 
+from pzd.artefacts import Rig
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
+from pzd.damper.model import BaseRow
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
     ELEMENT_COLUMNS,
@@ -28,17 +30,19 @@ from pzd.diagnosis.changes.pairs import (
     course,
     cycles_compared,
     model_compared,
-    octave_mean,
     paired,
+    stacked,
     unstacked,
 )
 from pzd.diagnosis.changes.regression import LEVEL, Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
-from pzd.diagnosis.changes.state import State, about
+from pzd.diagnosis.changes.state import State, about, diagnosed_state
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array
+from pzd.rig.config import FilesEntry, RigConfig
 from pzd.schema.errors import DataError, counted
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -49,12 +53,15 @@ GAS_LENGTHS = (1.0, 100.0)
 Reason: shorter than the stroke it could not be compressed, and one of a hundred half strokes hardens by a hundredth."""
 POLYTROPIC = 1.3
 """Exponent of the gas of an accumulator or a monotube damper (`effects/accumulator.py`)."""
+SHOWN = 0.3
+"""Change of a coordinate that must be visible for a quantity to be told unchanged: a third of T0, C, k or the scale of
+an effect. What moves the force by less is not shown by the tests."""
 ZERO_SHARE = 0.01
-"""Shift of the mean displacement that is reported, as a share of the half stroke: an actuator centres as well as that."""
+"""Shift of the mean displacement that is reported, as a share of the half stroke: an actuator centres so well."""
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ComparedCycle:
     """One compared motion over the cycle, for the picture; every array is (points,)."""
 
     before: str | None
@@ -73,7 +80,7 @@ class Compared:
     """What changed, and the curves behind it."""
 
     changes: Changes
-    courses: tuple[Course, ...]
+    cycles: tuple[ComparedCycle, ...]
     undetermined: tuple[str, ...] = ()
     """Why the result is not to be trusted: T0 or C of a state is undetermined."""
 
@@ -105,7 +112,37 @@ def changes_between(
     )
     best = search.run()
     findings = Findings(first, search, best, diagnose, control, before, after)
-    return Compared(findings.changes(), findings.courses(), (*before.undetermined, *after.undetermined))
+    return Compared(findings.changes(), findings.cycles(), (*before.undetermined, *after.undetermined))
+
+
+def changes_between_rigs(
+    before: Rig,
+    after: Rig,
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    control: Control,
+    settings: tuple[str | None, str | None] = (None, None),
+    names: tuple[str, str] = ("before", "after"),
+    jobs: int = 1,
+) -> Compared:
+    """Identify two states from their records, diagnose the first, and find what changed.
+
+    Parameters
+    ----------
+    before, after : records of both states
+    diagnose, identify : blocks of the config
+    control : the control signal
+    settings : of the rigs, the one that each state is
+    names : of the states
+    jobs : processes or threads that identification and diagnosis may use
+    """
+    stand = RigConfig(files=(FilesEntry(path="*"),))
+    rigs = zip(names, (before, after), settings, strict=True)
+    found = [(name, rig, run_identify(identify, rig, jobs), setting) for name, rig, setting in rigs]
+    first, second = (State.of(*each, control) for each in found)
+    _, rig, identified, setting = found[0]
+    first = diagnosed_state(first, rig, identified, setting, diagnose, identify, stand, control, jobs)
+    return changes_between(first, second, diagnose, identify, control)
 
 
 # --- What is compared
@@ -131,20 +168,40 @@ def comparisons_of(before: State, after: State, identify: IdentifyConfig) -> tup
     matched = {j for _, j in pairs}
     found = [cycles_compared(before.damper, one[i], other[j]) for i, j in pairs]
     mean = float(np.mean([t.displacement[0].real for t in one])) if one else before.damper.zero_m
-    for j, test in enumerate(other):
-        if j not in matched and _covered(before, test):
-            found.append(model_compared(before.damper, test, mean, _temperature(before, test)))
+    rest = [test for j, test in enumerate(other) if j not in matched]
+    known = [test for test in rest if _as_tested(before, test, identify)]
+    if not known and not found:
+        known = [test for test in rest if _in_range(before, test)]
+    found += [model_compared(before.damper, test, mean, _temperature(before, test)) for test in known]
     if not found:
         raise DataError(f"{before.name}, {after.name}: no test of either state has a control signal of the other")
     return tuple(found)
 
 
-def _covered(before: State, test: AveragedTest) -> bool:
-    """Whether the first state was identified over the control signal of a test."""
+def _as_tested(before: State, test: AveragedTest, identify: IdentifyConfig) -> bool:
+    """Whether the first state was tested at the control signal and the temperature of a test."""
+    within = identify.group.temperature_degC
+    slack = _voltage_slack(before, identify.group.voltage_V)
+
+    def near(row: BaseRow) -> bool:
+        level = None in (row.voltage_V, test.voltage) or abs((row.voltage_V or 0.0) - (test.voltage or 0.0)) <= slack
+        if row.temperature_degC is None or test.temperature is None:
+            return level
+        return level and abs(row.temperature_degC - test.temperature) <= within
+
+    return any(near(row) for row in before.damper.base)
+
+
+def _voltage_slack(before: State, given: float | None) -> float:
+    return CONSTANT_SHARE * before.voltage_scale if given is None else given
+
+
+def _in_range(before: State, test: AveragedTest) -> bool:
+    """Whether the control signal of a test lies between those of the first state."""
     if test.voltage is None:
         return True
     nodes = [voltage for voltage, _ in rows_per_voltage(before.damper.base)]
-    slack = CONSTANT_SHARE * max(before.voltage_scale, abs(test.voltage))
+    slack = _voltage_slack(before, None)
     return min(nodes) - slack <= test.voltage <= max(nodes) + slack
 
 
@@ -158,15 +215,14 @@ def _temperature(before: State, test: AveragedTest) -> float | None:
 
 
 def model_discrepancy(state: State) -> float:
-    """Return what the damper misses in its own tests, as a share of the force in every octave (r.m.s.)."""
-    shares = []
+    """Return what the damper misses in its own tests, as a share of the force (r.m.s.)."""
+    missed, force = 0.0, 0.0
     for test in averaged(state.prepared):
         mean = float(test.displacement[0].real)
         alone = model_compared(state.damper, test, mean, test.temperature)
-        power = octave_mean(np.abs(alone.reference) ** 2)
-        shape = np.concatenate([power, power[1:]])
-        shares.append(float(np.mean(np.maximum(alone.difference**2 - alone.variance, 0.0) / np.maximum(shape, 1e-30))))
-    return float(np.sqrt(np.mean(shares))) if shares else 0.0
+        missed += max(float(np.sum(alone.difference**2 - alone.variance)), 0.0) / alone.peak**2
+        force += float(np.sum(np.abs(stacked(alone.reference)) ** 2)) / alone.peak**2
+    return float(np.sqrt(missed / force)) if force > 0.0 else 0.0
 
 
 # --- What is found
@@ -238,10 +294,9 @@ class Findings:
     def _is_visible(self, difference: Difference) -> bool:
         """Whether what the states differ by is beyond noise, and beyond what two tests of one state differ by."""
         beyond = max(difference.rms_N**2 - difference.noise_N**2, 0.0) ** 0.5
-        tests = float(
-            np.sqrt(np.mean([np.sum((self.best.scatter.tests * A) ** 2) for A in self.search.regression.likelihood.columns]))
-        )
-        return beyond > max(self.diagnose.visible * self.first.force, LEVEL * tests)
+        columns = self.search.regression.likelihood.columns
+        tests = float(np.sqrt(np.mean([np.sum((self.best.scatter.tests * A) ** 2) for A in columns])))
+        return bool(beyond > max(self.diagnose.visible * self.first.force, LEVEL * tests))
 
     def _settled(self) -> tuple[Fitted, dict[str, list[str]]]:
         """Return the changes with those of the damper in the place of the stand's where something tells, and rivals."""
@@ -283,7 +338,7 @@ class Findings:
             return False
         length = -POLYTROPIC * changed["F_0"] / changed["k_g"]
         half_stroke = max(c.amplitude for c in self.comparisons)
-        return GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke
+        return bool(GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke)
 
     def _same_gas(self, best: Fitted, candidate: Candidate, rival: str) -> bool:
         return candidate.name == "preload_offset" and rival == "load_cell_zero" and self._is_gas(best)
@@ -345,14 +400,13 @@ class Findings:
             return self._element_values(mine)
         own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
         if isinstance(own, tuple):
-            ends = [tuple(v * (1.0 + x + s * LEVEL * e) for v in own) for s in (0.0, -1.0, 1.0)]
-            to, low, high = (tuple(min(a, b) for a, b in zip(one, one, strict=True)) for one in ends)
-            at = self.first.damper.effects[c.name]["at_voltage_V"]
-            return cast("tuple[float, ...]", at), own, to, low, high
+            ends = np.sort([[v * (1.0 + x + s * LEVEL * e) for v in own] for s in (-1.0, 0.0, 1.0)], axis=0)
+            at = cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
+            return at, own, tuple(ends[1].tolist()), tuple(ends[0].tolist()), tuple(ends[2].tolist())
         neutral = known_parameter(c.name, c.parameter).neutral
         start_value = own if own is not None else (neutral if np.isfinite(neutral) else None)
-        to, low, high = (parameter_value(c, x + s * LEVEL * e) for s in (0.0, -1.0, 1.0))
-        return None, start_value, to, min(low, high), max(low, high)
+        low, to, high = sorted(parameter_value(c, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0))
+        return None, start_value, to, low, high
 
     def _element_values(
         self, mine: Sequence[tuple[Coordinate, float, float]]
@@ -405,7 +459,7 @@ class Findings:
             Change(
                 name="displacement_zero", parameter="displacement_zero", of="stand", unit="m", from_=0.0, to=mean,
                 low95=mean - LEVEL * spread, high95=mean + LEVEL * spread, share=0.0,
-                reason="the displacement is recorded about another middle; forces are compared about the middle of each",
+                reason="the displacement has another middle; forces are compared about the middle of each",
             )
         ]  # fmt: skip
 
@@ -436,7 +490,7 @@ class Findings:
                 continue
             error, x = float(1.0 / np.sqrt(own @ own)), float(own @ residual / (own @ own))
             most = self.diagnose.visible / float(force)
-            if LEVEL * error > most or abs(x) > most:
+            if most > SHOWN or LEVEL * error > most or abs(x) > most:
                 continue
             at, start, to, low, high = self._values([(c, x, error)])
             found[candidate.key[0]] = Unchanged(
@@ -473,13 +527,13 @@ class Findings:
         )
         return "; ".join(told)
 
-    def courses(self) -> tuple[Course, ...]:
+    def cycles(self) -> tuple[ComparedCycle, ...]:
         """Return the compared cycles over their phase, with the difference that the changes make."""
         found = []
         for c, made in zip(self.comparisons, self.best.differences, strict=True):
             points = c.motion.time.size - c.begin
             found.append(
-                Course(
+                ComparedCycle(
                     c.before,
                     c.after,
                     c.voltage,
@@ -496,4 +550,3 @@ class Findings:
 def _added(fitted: Fitted, best: Fitted) -> list[str]:
     mine = {c.name for c in best.candidates}
     return [c.name for c in fitted.candidates if c.name not in mine]
-

@@ -306,9 +306,7 @@ def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -
     shift = phase_shift(before.displacement, after.displacement)
     mean = float(before.displacement[0].real)
     own = cycle_motion(before.displacement, before.frequency, mean, before.voltage, before.temperature)
-    moved = cycle_motion(
-        shifted(after.displacement, shift), after.frequency, mean, before.voltage, before.temperature
-    )
+    moved = cycle_motion(shifted(after.displacement, shift), after.frequency, mean, before.voltage, before.temperature)
     force, measured = before.error.mean[: last + 1], shifted(after.error.mean[: last + 1], shift)
     first = float(course(before.error.mean, max(2 * before.error.mean.size, POINTS))[0])
     begin = SETTLING * POINTS
@@ -330,7 +328,7 @@ def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -
         after.record.name,
         moved,
         begin,
-        2.0 * np.pi * after.frequency * np.arange(last + 1),
+        2.0 * np.pi * after.frequency * np.arange(last + 1, dtype=np.float64),
         force + simulated - spectrum(own),
         measured,
         simulated,
@@ -367,7 +365,7 @@ def model_compared(damper: Damper, after: AveragedTest, mean: float, temperature
         after.record.name,
         motion,
         begin,
-        2.0 * np.pi * after.frequency * np.arange(last + 1),
+        2.0 * np.pi * after.frequency * np.arange(last + 1, dtype=np.float64),
         simulated,
         after.error.mean[: last + 1],
         simulated,

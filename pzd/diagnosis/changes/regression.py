@@ -1,8 +1,8 @@
 """Fit of changes to the difference of force: noise, what the tests differ by themselves, and least squares.
 
 The covariance of a stacked difference has three parts: noise from the cycles; offset, gain and delay that any test has
-of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the difference in every
-octave. Both shares are estimated with the changes, so that a difference without a name is not taken for one that has.
+of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the difference in
+every octave. Both shares are estimated with the changes, so that a difference without a name is not given one.
 
 Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s) + u^2 A A'
                                                     Source: Gaussian likelihood; A of `pzd.signals.nuisance`
@@ -32,7 +32,7 @@ SHARES = (0.1, 0.17, 0.3, 0.5, 0.75, 1.0)
 DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
 """Shares of the difference without a name that are tried, from nothing to all of it."""
 LEAST_VARIANCE = 1e-10
-"""Variance of every number besides, as a share of the square of the peak force: 1e-5 of it, the error of a simulation."""
+"""Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pzd.diagnosis.changes.candidates import Candidate, excludes
+from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
 from pzd.record import Array
@@ -22,6 +22,8 @@ FITTED = 5
 """Candidates that are fitted in a step, of those that promise most."""
 SLACK = 30.0
 """A candidate whose promised criterion is worse than the best by more is not fitted: the promise is linearised."""
+BEAM = 3
+"""Beginnings that are followed to their end where one change leaves something: the best first step may mislead."""
 EXCHANGES = 6
 """Rounds of the exchange at most; each lowers the criterion."""
 BETTER = 1e-3
@@ -112,28 +114,49 @@ class Search:
     def _tried(self, before: Fitted) -> list[Candidate]:
         return [c for c in self.candidates if not any(excludes(c, adopted) for adopted in before.candidates)]
 
-    def _best_addition(self, before: Fitted) -> Fitted | None:
-        worth = self._promising(before, self._tried(before), before.scatter)[:FITTED]
-        fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._visible(fitted, fitted.candidates[-1])]
-        return min(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"), default=None)
+    def _additions(self, before: Fitted) -> list[Fitted]:
+        """Return the fits with one more change that is visible and physical, the best first."""
+        promising = self._promising(before, self._tried(before), before.scatter)
+        worth = [p for i, p in enumerate(promising) if i < FITTED or p.candidate.name in ELEMENT_COLUMNS]
+        fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._admissible(fitted)]
+        # Of two that do the same, what the stand may have done is not laid to the damper.
+        return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
     # --- The steps
 
     def run(self) -> Fitted:
-        """Adopt changes one by one, with exchange, as long as the criterion falls by enough."""
-        best = self.nothing()
+        """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end."""
+        nothing = self.nothing()
+        ends = [self._without_superfluous(self._continued(self._exchanged(f))) for f in self._beginnings(nothing)]
+        return min([nothing, *ends], key=lambda f: f.bic)
+
+    def _beginnings(self, nothing: Fitted) -> list[Fitted]:
+        """Return the best first changes, one alone where it leaves nothing visible."""
+        found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
+        if found and self._left(found[0]) < self.visible:
+            return found[:1]
+        return found[:BEAM]
+
+    def _left(self, fitted: Fitted) -> float:
+        """Return what a fit leaves above noise (r.m.s.), each test in units of its peak."""
+        pairs = zip(fitted.residuals, self.regression.comparisons, strict=True)
+        squares = [max(float(r @ r - np.sum(c.variance)), 0.0) / c.peak**2 for r, c in pairs]
+        return float(np.sqrt(np.mean(squares)))
+
+    def _continued(self, best: Fitted) -> Fitted:
+        """Adopt changes as long as the criterion falls by enough."""
         while len(best.candidates) < MOST_CHANGES:
-            more = self._best_addition(best)
+            more = next(iter(self._additions(best)), None)
             if more is None or more.bic - best.bic > self.adopt_bic:
                 break
             best = self._exchanged(more)
-        return self._without_superfluous(best)
+        return best
 
     def _exchanged(self, best: Fitted) -> Fitted:
         """Put other candidates in the place of each adopted one until nothing improves."""
         for _ in range(EXCHANGES):
-            tried = [self._best_addition(self.without(best, c)) for c in best.candidates]
-            better = min((t for t in tried if t is not None), key=lambda f: f.bic, default=best)
+            tried = [fitted for c in best.candidates for fitted in self._additions(self.without(best, c))[:1]]
+            better = min(tried, key=lambda f: f.bic, default=best)
             if better.bic > best.bic - BETTER - 1e-6 * abs(best.bic):
                 return best
             best = better
@@ -158,6 +181,12 @@ class Search:
         kept = tuple(c for c in fitted.candidates if c is not candidate)
         start = np.concatenate([fitted.values_of(c) for c in kept]) if kept else np.zeros(0)
         return self._fit(kept, start, fitted.scatter)
+
+    def _admissible(self, fitted: Fitted) -> bool:
+        """Whether the last change of a fit is visible, and physical."""
+        first = self.regression.response.first
+        natural = first.is_natural(fitted.coordinates, fitted.values.tolist())
+        return natural and self._visible(fitted, fitted.candidates[-1])
 
     def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
         return self.size_of(fitted, candidate) >= self.visible
@@ -185,9 +214,7 @@ class Search:
         whiteners = self.regression.likelihood.whiteners(fitted.scatter)
         columns = self.regression.columns(fitted.coordinates, fitted.values)
         J = [W @ c for W, c in zip(whiteners, columns, strict=True)]
-        target = [
-            W @ r + own @ fitted.values for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)
-        ]
+        target = [W @ r + own @ fitted.values for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)]
         kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
         gain = 0.0
         for fold in range(min(FOLDS, tests)):
@@ -208,4 +235,4 @@ class Search:
         limit = own.criterion + self.rival_bic + SLACK
         promising = [p for p in self._promising(less, tried, best.scatter) if p.criterion < limit][: 2 * FITTED]
         fits = [self._with(less, p) for p in promising]
-        return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic]
+        return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic and self._admissible(fitted)]

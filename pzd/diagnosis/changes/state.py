@@ -54,7 +54,7 @@ class State:
         peaks = [float(np.max(np.abs(r.force))) for r in self.records]
 
         def largest(values: Sequence[float]) -> float:
-            return max(max(values), float(np.finfo(float).tiny))
+            return max(*values, float(np.finfo(float).tiny))
 
         return Scales(
             largest(peaks),
@@ -90,8 +90,7 @@ def about(damper: Damper, zero: float) -> Damper:
 
     Equation: F_0 + k_g (x - z) = (F_0 + k_g (z' - z)) + k_g (x - z')
     """
-    others = [n for n in damper.effects if n != "gas_spring" and n in library() and library()[n].needs_displacement_zero]
-    if others:
+    if any(name in library() and library()[name].needs_displacement_zero for name in damper.effects):
         return damper
     effects: Effects = {name: dict(values) for name, values in damper.effects.items()}
     stiffness = effects.get("gas_spring", {}).get("k_g", 0.0)
@@ -102,4 +101,3 @@ def about(damper: Damper, zero: float) -> Damper:
     if moved != 0.0 or "preload_offset" in effects:
         effects["preload_offset"] = {"F_0": force + moved}
     return damper.model_copy(update={"effects": effects, "zero_m": zero})
-
