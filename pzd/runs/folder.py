@@ -44,7 +44,12 @@ _CONFIG_HEAD = "# Written by pzd with every default. An output: edit the config 
 """First line of the written config, with the hash of the rest: where it does not fit, somebody edited the file."""
 _WRITTEN = ".written.json"
 """Hashes of what was written into a folder that is no stage and has no manifest."""
-_FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures", "peers")
+_FOLDERS = (
+    *(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)),
+    "figures",
+    "peers",
+    "changes",
+)
 """What a run's folder may hold."""
 _WRITTEN_IN_PLACE = ("export", "sweep", "blind")
 """What it may hold beside them, where files are replaced one by one."""

@@ -1,0 +1,116 @@
+"""Artefact of `pzd changes`: what changed between two states of a damper, or over more than two.
+
+The models are the JSON of the command, key by key.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import ConfigDict, Field
+
+from pzd.artefacts.diagnosis import NextTest
+from pzd.schema.model import Frozen
+
+
+class _Keyed(Frozen):
+    """Model of which some keys are words of Python, written with an underscore behind them in code."""
+
+    model_config = ConfigDict(populate_by_name=True, serialize_by_alias=True)
+
+
+Numbers = float | tuple[float | None, ...] | None
+"""A value, or one for each of `at_voltage_V`; None where it is undetermined."""
+
+
+class Difference(Frozen):
+    """Size of the difference between the forces of the two states, r.m.s. over the compared tests."""
+
+    rms_N: float = Field(ge=0.0)
+    share_of_peak: float = Field(ge=0.0)
+    """In the largest force of the first state."""
+    noise_N: float = Field(ge=0.0)
+    """What noise leaves in it."""
+    left_N: float = Field(ge=0.0)
+    """What is left when all changes are allowed for."""
+    explained: float = Field(ge=0.0, le=1.0)
+    """Share of its mean square above noise that the changes explain."""
+
+
+class Change(_Keyed):
+    """One quantity that changed."""
+
+    name: str
+    """T0, C, k, an effect, `knee`, `temperature`, or what the stand did."""
+    parameter: str
+    of: Literal["damper", "stand"]
+    unit: str
+    from_: Numbers = Field(alias="from")
+    to: Numbers
+    low95: Numbers
+    """Of `to`, with `from` held."""
+    high95: Numbers
+    at_voltage_V: tuple[float, ...] | None = None
+    share: float
+    """Of the mean square of the difference that is left without this change, the others fitted again."""
+    reason: str
+
+
+class Unchanged(_Keyed):
+    """One quantity whose visible change the tests would have shown."""
+
+    name: str
+    parameter: str
+    unit: str
+    from_: Numbers = Field(alias="from")
+    to: Numbers
+    low95: Numbers
+    high95: Numbers
+    at_voltage_V: tuple[float, ...] | None = None
+
+
+class Changes(_Keyed):
+    """What changed between two states of a damper, how sure that is, and what cannot be told apart."""
+
+    verdict: Literal["changed", "unchanged", "ambiguous", "unexplained"]
+    from_: str = Field(alias="from")
+    to: str
+    compared: Literal["cycles", "model", "both"]
+    difference: Difference
+    changes: tuple[Change, ...]
+    unchanged: tuple[Unchanged, ...]
+    rivals: tuple[str, ...]
+    reason: str
+    next_test: NextTest | None = None
+
+
+class CourseRow(_Keyed):
+    """One quantity over the states."""
+
+    name: str
+    parameter: str
+    unit: str
+    values: tuple[Numbers, ...]
+    low95: tuple[Numbers, ...]
+    high95: tuple[Numbers, ...]
+    at_voltage_V: tuple[float, ...] | None = None
+    pass_: bool | None = Field(default=None, alias="pass")
+    """Whether every state lies within the tolerance; None where there is none, or where an interval crosses it."""
+
+
+class Course(_Keyed):
+    """What changed over more than two states, each against the first."""
+
+    verdict: Literal["changed", "unchanged", "ambiguous", "unexplained"]
+    from_: str = Field(alias="from")
+    to: str
+    states: tuple[str, ...]
+    compared: Literal["cycles", "model", "both"]
+    difference: Difference
+    """Between the first state and the last."""
+    over: tuple[CourseRow, ...]
+    unchanged: tuple[Unchanged, ...]
+    rivals: tuple[str, ...]
+    reason: str
+    next_test: NextTest | None = None
+    pass_: bool | None = Field(default=None, alias="pass")

@@ -1,0 +1,355 @@
+"""What may have changed, and the force of a damper in which it has: quantities of the damper and doings of the stand.
+
+Every candidate is a set of coordinates, each 0 where nothing changed: a share of T0, a logarithm of C or k, the
+difference of an effect's parameter in the scale of its search. The stand acts on the recorded force as a whole, so what
+it does includes what no model explains.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from pzd.damper.compose import respond
+from pzd.damper.confounders import known
+from pzd.damper.effect import Parameter, Scales
+from pzd.damper.effects import library
+from pzd.damper.fitted_laws import fitted_laws
+from pzd.damper.model import BaseRow, Damper, against_nature
+from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
+from pzd.diagnosis.changes.pairs import Comparison, stacked
+from pzd.diagnosis.fit.problem import BOUND
+from pzd.record import Array, Complex
+
+Of = Literal["damper", "stand"]
+
+LARGEST_GAIN = 0.05
+"""Largest change of the gain that is the load cell's: a larger one is the damper's, by the contract."""
+LARGEST_DELAY = 0.005
+"""Largest change of the delay that is the recorder's [s]: a longer one is the damper's."""
+LEAST_FRICTION = 0.01
+"""Share of the peak force from which T0 changes in proportion to itself; a smaller one in that of the peak force."""
+LARGEST_RATIO = 3.0
+"""C and k change by up to e^3 = 20 times: beyond, they are not shown by the tests."""
+FRICTION_STARTS = (0.0, -0.7, 1.5)
+RATIO_STARTS = (0.0, -1.2, 1.2)
+"""Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
+TOLERANCE = 1e-6
+"""Tolerance of the simulations, as a share of the force: far below what counts."""
+SHARE = "share"
+"""Coordinate of a known temperature: 0 at that of the first state, 1 at that recorded in the second."""
+LEAST_WARMING = 0.5
+"""Difference of the mean temperatures [K] from which temperature is a candidate: the resolution of a thermocouple."""
+
+ELEMENT_UNITS = {"T0": "N", "C": "N s/m", "k": "N/m"}
+ELEMENT_COLUMNS = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
+STAND: Mapping[str, tuple[str, float]] = {
+    "load_cell_zero": ("N", np.inf),
+    "load_cell_gain": ("-", LARGEST_GAIN),
+    "recorder_delay": ("s", LARGEST_DELAY),
+}
+"""Unit and largest size of what the stand may have done to the force; the zero of the displacement moves no force."""
+NOT_HERE = ("sensor_delay", "temperature_drift")
+"""Effects that are no change by themselves: one state's delay is in both, and a temperature is recorded."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number that may have changed, 0 where it has not."""
+
+    name: str
+    """T0, C, k, an effect, `temperature`, or what the stand did."""
+    parameter: str
+    of: Of
+    unit: str
+    scale: float
+    """Change of the parameter by one unit of the coordinate, to first order."""
+    node: int | None = None
+    """Index of its voltage; None for one change at every voltage."""
+    low: float = -np.inf
+    high: float = np.inf
+    logarithmic: bool = False
+    """Whether the coordinate is the logarithm of the ratio to `start`."""
+    start: float = 0.0
+    """Value at coordinate 0: that of the first state, or the scale of the search where that is absent."""
+    absent: bool = False
+    """Whether the first state has it not, so that a logarithmic coordinate of 0 is a change."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One cause that may have changed the force."""
+
+    name: str
+    of: Of
+    coordinates: tuple[Coordinate, ...]
+    starts: tuple[tuple[float, ...], ...]
+    """Starting values of a fit, (coordinates,) each."""
+    absent: bool = False
+    """Whether the first state does not have it: an effect that is newly there."""
+
+    @property
+    def per_voltage(self) -> bool:
+        """Whether it has one change at every voltage."""
+        return any(c.node is not None for c in self.coordinates)
+
+    @property
+    def key(self) -> tuple[tuple[str, str], ...]:
+        """What it changes."""
+        return tuple(dict.fromkeys((c.name, c.parameter) for c in self.coordinates))
+
+
+def excludes(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates change the same quantity."""
+    return bool(set(one.key) & set(other.key)) or one.name == other.name
+
+
+# --- The damper in which something changed
+
+
+@dataclass(frozen=True, eq=False)
+class FirstState:
+    """The damper of the first state, and what is needed to change it."""
+
+    damper: Damper
+    force: float
+    """Largest force [N]."""
+    scales: Scales
+
+    def changed(self, coordinates: Sequence[Coordinate], values: Sequence[float], warmer: float | None) -> Damper:
+        """Return the damper in which some coordinates have other values; those of the stand are left out.
+
+        Parameters
+        ----------
+        coordinates : what changed
+        values : of the coordinates
+        warmer : temperature of the second state less that of the first [K]
+        """
+        rows = {id(row): row for row in self.damper.base}
+        groups = rows_per_voltage(self.damper.base)
+        effects = {name: dict(own) for name, own in self.damper.effects.items()}
+        for c, x in zip(coordinates, values, strict=True):
+            if c.of == "stand" or c.parameter == SHARE:
+                continue
+            if c.name in ELEMENT_COLUMNS or c.name == "temperature":
+                of_node = range(len(groups)) if c.node is None else (c.node,)
+                for original in (row for i in of_node for row in groups[i][1]):
+                    rows[id(original)] = self._row(rows[id(original)], c, x, warmer)
+            else:
+                self._move_effect(effects, c, x)
+        base = tuple(rows[id(row)] for row in self.damper.base)
+        return self.damper.model_copy(update={"base": base, "effects": effects})
+
+    def _row(self, row: BaseRow, c: Coordinate, x: float, warmer: float | None) -> BaseRow:
+        if c.name == "temperature":
+            column = ELEMENT_COLUMNS["T0" if c.parameter == "beta_T0" else "C"]
+            return row.model_copy(update={column: getattr(row, column) * float(np.exp(-x * (warmer or 0.0)))})
+        column = ELEMENT_COLUMNS[c.name]
+        value = getattr(row, column)
+        if c.logarithmic:
+            return row.model_copy(update={column: value * float(np.exp(x))})
+        share = value if value > LEAST_FRICTION * self.force or c.node is None else self.force
+        if c.node is None and all(LEAST_FRICTION * self.force >= r.T0_N for r in self.damper.base):
+            share = self.force
+        return row.model_copy(update={column: max(value + x * share, 0.0)})
+
+    def _move_effect(self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float) -> None:
+        parameter = known_parameter(c.name, c.parameter)
+        own = effects.setdefault(c.name, {p.name: p.neutral for p in known_effect(c.name).parameters})
+        present = own.get(c.parameter, parameter.neutral)
+        if isinstance(present, tuple):
+            own[c.parameter] = tuple(float(np.clip(v * (1.0 + x), parameter.low, parameter.high)) for v in present)
+            return
+        own[c.parameter] = parameter_value(c, x)
+
+    def is_natural(self, coordinates: Sequence[Coordinate], values: Sequence[float]) -> bool:
+        """Whether the effects that changed have physical values, as far as those of the first state had."""
+        before = against_nature(without_laws(self.damper))
+        return set(against_nature(without_laws(self.changed(coordinates, values, None)))) <= set(before)
+
+
+def element_of(damper: Damper, voltage: float | None, temperature: float | None) -> Array:
+    """Return (3,) T0 [N], C [N s/m] and k [N/m] of a damper at a control signal [V] and a temperature [degC]."""
+    if temperature is None and len({row.temperature_degC for row in damper.base}) > 1:
+        temperature = float(np.median([row.temperature_degC or 0.0 for row in damper.base]))
+    return np.asarray(bingham_parameters(damper, voltage, temperature)[0])
+
+
+def without_laws(damper: Damper) -> Damper:
+    """Return a damper without the laws in the place of T0 and C, of which no values are against nature."""
+    return damper.without_effects(*fitted_laws())
+
+
+def known_effect(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN201
+    """Return an effect of the library or a fitted law by name."""
+    return known().get(name) or fitted_laws()[name]
+
+
+def known_parameter(name: str, parameter: str) -> Parameter:
+    """Return a parameter of an effect."""
+    found: Parameter = known_effect(name).parameter(parameter)
+    return found
+
+
+def parameter_value(c: Coordinate, x: float) -> float:
+    """Return the value of an effect's parameter at a value of its coordinate."""
+    parameter = known_parameter(c.name, c.parameter)
+    value = c.start * float(np.exp(x)) if c.logarithmic else c.start + x * c.scale
+    return float(np.clip(value, parameter.low, parameter.high))
+
+
+# --- The candidates
+
+
+def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Candidate]:
+    """List what may have changed, the doings of the stand first, so that what both explain is not the damper's."""
+    found = [_of_stand(name, first.force) for name in STAND]
+    found += _of_element(first, comparisons)
+    warmer = [c.warmer for c in comparisons if c.warmer is not None]
+    if len(warmer) == len(comparisons) and max(map(abs, warmer), default=0.0) > LEAST_WARMING:
+        found.append(_warming(first.damper, max(map(abs, warmer))))
+    for name, effect in {**library(), **fitted_laws()}.items():
+        present = name in first.damper.effects
+        if name in NOT_HERE or (not present and (effect.never_named or name in fitted_laws())):
+            continue
+        if effect.needs is not None:
+            continue
+        found += _present(first, name) if present else [_absent(first, name)]
+    return found
+
+
+def _of_stand(name: str, force: float) -> Candidate:
+    unit, most = STAND[name]
+    scale = force if name == "load_cell_zero" else most
+    limit = most / scale
+    return Candidate(name, "stand", (Coordinate(name, name, "stand", unit, scale, None, -limit, limit),), ((0.0,),))
+
+
+def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Candidate]:
+    groups = rows_per_voltage(first.damper.base)
+    compared = sorted({_nearest(groups, c.voltage) for c in comparisons})
+    found = []
+    for name, unit in ELEMENT_UNITS.items():
+        low, high = (-np.inf, np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
+        whole = Coordinate(name, name, "damper", unit, 1.0, None, low, high, name != "T0")
+        starts = FRICTION_STARTS if name == "T0" else RATIO_STARTS
+        found.append(Candidate(name, "damper", (whole,), tuple((x,) for x in starts)))
+        if len(compared) > 1:
+            nodes = tuple(replace(whole, node=node) for node in compared)
+            found.append(Candidate(name, "damper", nodes, tuple((x,) * len(nodes) for x in starts)))
+    return found
+
+
+def _nearest(groups: Sequence[tuple[float, list[BaseRow]]], voltage: float | None) -> int:
+    return min(range(len(groups)), key=lambda i: abs(groups[i][0] - (voltage or 0.0)))
+
+
+def _warming(damper: Damper, warmer: float) -> Candidate:
+    """Return the recorded temperature as a cause: by what the damper knows of it, else by a drift of T0 and C."""
+    if knows_temperature(damper):
+        share = Coordinate("temperature", SHARE, "damper", "-", 1.0, None, -1.0, 3.0)
+        return Candidate("temperature", "damper", (share,), ((1.0,),))
+    most = 1.0 / warmer
+    betas = tuple(
+        Coordinate("temperature", beta, "damper", "1/K", 1.0, None, -most, most) for beta in ("beta_T0", "beta_C")
+    )
+    return Candidate("temperature", "damper", betas, ((0.0, 0.0),))
+
+
+def knows_temperature(damper: Damper) -> bool:
+    """Whether a damper has T0, C and k at several temperatures, or a drift."""
+    rows = {row.temperature_degC for row in damper.base}
+    return len(rows) > 1 or "temperature_drift" in damper.effects
+
+
+def _absent(first: FirstState, name: str) -> Candidate:
+    """Return an effect that is newly there, with its starting values."""
+    coordinates = []
+    for p in known_effect(name).parameters:
+        scale = p.search.scale(first.scales) or 1.0
+        low, high = p.low / scale, p.high / scale
+        if p.search.logarithmic:
+            limits = float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, True, scale, True))
+        else:
+            neutral = p.neutral if np.isfinite(p.neutral) else 0.0
+            least, most = p.search.within
+            limits = max(low, least, -BOUND) - neutral / scale, min(high, most, BOUND) - neutral / scale
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, neutral, True))
+
+    def searched(c: Coordinate, x: float) -> float:
+        return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
+
+    grid = itertools.product(*(p.search.starts for p in known_effect(name).parameters))
+    starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
+    return Candidate(name, "damper", tuple(coordinates), starts, absent=True)
+
+
+def _present(first: FirstState, name: str) -> list[Candidate]:
+    """Return each parameter of an effect that the first state has, and all of them together."""
+    own, coordinates = first.damper.effects[name], []
+    for p in known_effect(name).parameters:
+        value = own[p.name]
+        if isinstance(value, tuple):
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, 20.0))
+        elif p.search.logarithmic and value > 0.0:
+            limits = float(np.log(max(p.low / value, 1.0 / BOUND))), float(np.log(min(p.high / value, BOUND)))
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, value, None, *limits, True, value))
+        else:
+            scale = p.search.scale(first.scales) or 1.0
+            limits = (p.low - value) / scale, (p.high - value) / scale
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, value))
+    single = [Candidate(name, "damper", (c,), ((0.0,),)) for c in coordinates]
+    together = Candidate(name, "damper", tuple(coordinates), ((0.0,) * len(coordinates),))
+    return [*single, together] if len(coordinates) > 1 else single
+
+
+# --- The difference of force that they make
+
+
+@dataclass(eq=False)
+class Response:
+    """Difference of force that changed coordinates make in every comparison; simulations are kept."""
+
+    first: FirstState
+    comparisons: tuple[Comparison, ...]
+    _simulated: dict[tuple[tuple[Coordinate, float], ...], tuple[Complex, ...]] = field(
+        default_factory=dict, repr=False
+    )
+
+    def of(self, coordinates: Sequence[Coordinate], values: Sequence[float]) -> tuple[Array, ...]:
+        """Compute the (2 H + 1,) stacked difference of force in every comparison [N].
+
+        Equation: D = (1 + g) exp(-i w tau) (F + R' - R) + F_z - F, F as recorded in the first state, R simulated
+        """
+        stand = {c.name: x * c.scale for c, x in zip(coordinates, values, strict=True) if c.of == "stand"}
+        moved = tuple((c, float(x)) for c, x in zip(coordinates, values, strict=True) if c.of == "damper")
+        found = []
+        for comparison, change in zip(self.comparisons, self._changes(moved), strict=True):
+            force = comparison.reference + change
+            late = np.exp(-1j * comparison.rate * stand.get("recorder_delay", 0.0))
+            seen = (1.0 + stand.get("load_cell_gain", 0.0)) * late * force
+            seen[0] += stand.get("load_cell_zero", 0.0)
+            found.append(stacked(seen - comparison.reference))
+        return tuple(found)
+
+    def _changes(self, moved: tuple[tuple[Coordinate, float], ...]) -> tuple[Complex, ...]:
+        if all(x == 0.0 and not (c.logarithmic and c.absent) for c, x in moved):
+            return tuple(np.zeros_like(c.reference) for c in self.comparisons)
+        if moved not in self._simulated:
+            coordinates, values = [c for c, _ in moved], [x for _, x in moved]
+            self._simulated[moved] = tuple(self._change(c, coordinates, values) for c in self.comparisons)
+        return self._simulated[moved]
+
+    def _change(self, comparison: Comparison, coordinates: Sequence[Coordinate], values: Sequence[float]) -> Complex:
+        damper = self.first.changed(coordinates, values, comparison.warmer)
+        motion = comparison.motion
+        for c, x in zip(coordinates, values, strict=True):
+            if c.parameter == SHARE and motion.temperature is not None:
+                motion = replace(motion, temperature=motion.temperature + x * (comparison.warmer or 0.0))
+        force = respond(damper, motion, comparison.first_force, TOLERANCE)
+        return np.asarray(comparison.spectrum(force) - comparison.simulated)

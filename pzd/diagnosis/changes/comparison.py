@@ -1,0 +1,552 @@
+"""From two states of a damper to what changed between them: the steps in order, and the words of the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+
+from pzd.artefacts import Rig
+from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
+from pzd.damper.model import BaseRow
+from pzd.damper.parameter_rows import rows_per_voltage
+from pzd.diagnosis.changes.candidates import (
+    ELEMENT_COLUMNS,
+    Candidate,
+    Coordinate,
+    FirstState,
+    Response,
+    candidates,
+    element_of,
+    known_parameter,
+    parameter_value,
+)
+from pzd.diagnosis.changes.pairs import (
+    AveragedTest,
+    Comparison,
+    averaged,
+    course,
+    cycles_compared,
+    model_compared,
+    paired,
+    stacked,
+    unstacked,
+)
+from pzd.diagnosis.changes.regression import LEVEL, Fitted, Likelihood, Regression
+from pzd.diagnosis.changes.selection import Search
+from pzd.diagnosis.changes.state import State, about, diagnosed_state
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify as run_identify
+from pzd.quantities import Control
+from pzd.record import CONSTANT_SHARE, Array
+from pzd.rig.config import FilesEntry, RigConfig
+from pzd.schema.errors import DataError, counted
+
+Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
+
+GAS_LENGTHS = (1.0, 100.0)
+"""Shortest and longest gas column, in half strokes, whose force and stiffness change together as those of a gas do.
+
+Reason: shorter than the stroke it could not be compressed, and one of a hundred half strokes hardens by a hundredth."""
+POLYTROPIC = 1.3
+"""Exponent of the gas of an accumulator or a monotube damper (`effects/accumulator.py`)."""
+SHOWN = 0.3
+"""Change of a coordinate that must be visible for a quantity to be told unchanged: a third of T0, C, k or the scale of
+an effect. What moves the force by less is not shown by the tests."""
+ZERO_SHARE = 0.01
+"""Shift of the mean displacement that is reported, as a share of the half stroke: an actuator centres so well."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedCycle:
+    """One compared motion over the cycle, for the picture; every array is (points,)."""
+
+    before: str | None
+    after: str
+    voltage: float | None
+    displacement: Array
+    velocity: Array
+    force_before: Array
+    force_after: Array
+    explained: Array
+    """Difference that the changes make [N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What changed, and the curves behind it."""
+
+    changes: Changes
+    cycles: tuple[ComparedCycle, ...]
+    undetermined: tuple[str, ...] = ()
+    """Why the result is not to be trusted: T0 or C of a state is undetermined."""
+
+
+def changes_between(
+    before: State, after: State, diagnose: DiagnoseConfig, identify: IdentifyConfig, control: Control
+) -> Compared:
+    """Find what changed between two states of a damper.
+
+    Parameters
+    ----------
+    before : the first state, whose damper carries small differences of motion and stands in for motions not run in it
+    after : the second state
+    diagnose : thresholds and the priors on how tests differ
+    identify : for what counts as one condition
+    control : the control signal, for units
+
+    Raises
+    ------
+    DataError : when no test of the second state can be compared
+    """
+    comparisons = comparisons_of(before, after, identify)
+    mean = float(np.mean([c.mean_displacement for c in comparisons]))
+    first = FirstState(about(before.damper, mean), max(c.peak for c in comparisons), before.scales())
+    likelihood = Likelihood(comparisons, diagnose.nuisance, model_discrepancy(before))
+    regression = Regression(likelihood, Response(first, comparisons))
+    search = Search(
+        regression, candidates(first, comparisons), diagnose.adopt_bic, diagnose.rival_bic, diagnose.visible
+    )
+    best = search.run()
+    findings = Findings(first, search, best, diagnose, control, before, after)
+    return Compared(findings.changes(), findings.cycles(), (*before.undetermined, *after.undetermined))
+
+
+def changes_between_rigs(
+    before: Rig,
+    after: Rig,
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    control: Control,
+    settings: tuple[str | None, str | None] = (None, None),
+    names: tuple[str, str] = ("before", "after"),
+    jobs: int = 1,
+) -> Compared:
+    """Identify two states from their records, diagnose the first, and find what changed.
+
+    Parameters
+    ----------
+    before, after : records of both states
+    diagnose, identify : blocks of the config
+    control : the control signal
+    settings : of the rigs, the one that each state is
+    names : of the states
+    jobs : processes or threads that identification and diagnosis may use
+    """
+    stand = RigConfig(files=(FilesEntry(path="*"),))
+    rigs = zip(names, (before, after), settings, strict=True)
+    found = [(name, rig, run_identify(identify, rig, jobs), setting) for name, rig, setting in rigs]
+    first, second = (State.of(*each, control) for each in found)
+    _, rig, identified, setting = found[0]
+    first = diagnosed_state(first, rig, identified, setting, diagnose, identify, stand, control, jobs)
+    return changes_between(first, second, diagnose, identify, control)
+
+
+# --- What is compared
+
+
+def comparisons_of(before: State, after: State, identify: IdentifyConfig) -> tuple[Comparison, ...]:
+    """Pair the tests, and compare the others of the second state with the damper of the first.
+
+    Raises
+    ------
+    DataError : when none of the second state repeats
+    """
+    one, other = averaged(before.prepared), averaged(after.prepared)
+    if not other:
+        raise DataError(
+            f"{after.name}: no test repeats its motion at a constant control signal, so there is no cycle to compare; "
+            "run a sine or triangle for three cycles or more"
+        )
+    within = identify.group.voltage_V
+    if within is None:
+        within = CONSTANT_SHARE * max(before.voltage_scale, after.voltage_scale)
+    pairs = paired(one, other, within, identify.group.temperature_degC)
+    matched = {j for _, j in pairs}
+    found = [cycles_compared(before.damper, one[i], other[j]) for i, j in pairs]
+    mean = float(np.mean([t.displacement[0].real for t in one])) if one else before.damper.zero_m
+    rest = [test for j, test in enumerate(other) if j not in matched]
+    known = [test for test in rest if _as_tested(before, test, identify)]
+    if not known and not found:
+        known = [test for test in rest if _in_range(before, test)]
+    found += [model_compared(before.damper, test, mean, _temperature(before, test)) for test in known]
+    if not found:
+        raise DataError(f"{before.name}, {after.name}: no test of either state has a control signal of the other")
+    return tuple(found)
+
+
+def _as_tested(before: State, test: AveragedTest, identify: IdentifyConfig) -> bool:
+    """Whether the first state was tested at the control signal and the temperature of a test."""
+    within = identify.group.temperature_degC
+    slack = _voltage_slack(before, identify.group.voltage_V)
+
+    def near(row: BaseRow) -> bool:
+        level = None in (row.voltage_V, test.voltage) or abs((row.voltage_V or 0.0) - (test.voltage or 0.0)) <= slack
+        if row.temperature_degC is None or test.temperature is None:
+            return level
+        return level and abs(row.temperature_degC - test.temperature) <= within
+
+    return any(near(row) for row in before.damper.base)
+
+
+def _voltage_slack(before: State, given: float | None) -> float:
+    return CONSTANT_SHARE * before.voltage_scale if given is None else given
+
+
+def _in_range(before: State, test: AveragedTest) -> bool:
+    """Whether the control signal of a test lies between those of the first state."""
+    if test.voltage is None:
+        return True
+    nodes = [voltage for voltage, _ in rows_per_voltage(before.damper.base)]
+    slack = _voltage_slack(before, None)
+    return min(nodes) - slack <= test.voltage <= max(nodes) + slack
+
+
+def _temperature(before: State, test: AveragedTest) -> float | None:
+    """Return the temperature of the first state at which a test without a partner is simulated [degC]."""
+    known = [r.median_temperature() for r in before.records]
+    recorded = [t for t in known if t is not None]
+    if not recorded or test.temperature is None:
+        return test.temperature
+    return float(np.clip(test.temperature, min(recorded), max(recorded)))
+
+
+def model_discrepancy(state: State) -> float:
+    """Return what the damper misses in its own tests, as a share of the force (r.m.s.)."""
+    missed, force = 0.0, 0.0
+    for test in averaged(state.prepared):
+        mean = float(test.displacement[0].real)
+        alone = model_compared(state.damper, test, mean, test.temperature)
+        missed += max(float(np.sum(alone.difference**2 - alone.variance)), 0.0) / alone.peak**2
+        force += float(np.sum(np.abs(stacked(alone.reference)) ** 2)) / alone.peak**2
+    return float(np.sqrt(missed / force)) if force > 0.0 else 0.0
+
+
+# --- What is found
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """The fitted changes, and what of them is reported."""
+
+    first: FirstState
+    search: Search
+    best: Fitted
+    diagnose: DiagnoseConfig
+    control: Control
+    before: State
+    after: State
+
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """What is compared."""
+        return self.search.regression.comparisons
+
+    def changes(self) -> Changes:
+        """Return verdict and tables."""
+        best, rivals = self._settled()
+        difference = self.difference(best)
+        reported = self._reported(best)
+        zero = self._displacement_zero()
+        of_damper = [change for change in reported if change.of == "damper"]
+        verdict: Verdict = "changed" if of_damper else "unchanged"
+        if rivals:
+            verdict = "ambiguous"
+        if self._left_share(difference) > self.diagnose.unexplained_share and self._is_visible(difference):
+            verdict = "unexplained"
+        listed = sorted([*reported, *zero], key=lambda change: -change.share)
+        kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
+        compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
+        return Changes(
+            verdict=verdict,
+            from_=self.before.name,
+            to=self.after.name,
+            compared=compared,
+            difference=difference,
+            changes=tuple(listed),
+            unchanged=self._unchanged(best),
+            rivals=tuple(dict.fromkeys(name for names in rivals.values() for name in names)),
+            reason=self._reason(verdict, listed, rivals, difference),
+        )
+
+    def difference(self, best: Fitted) -> Difference:
+        """Return the size of the difference and of what is left of it."""
+        whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
+        noise = float(np.mean([np.sum(c.variance) for c in self.comparisons]))
+        left = best.mean_square
+        explained = 1.0 - max(left - noise, 0.0) / (whole - noise) if whole > noise else 0.0
+        return Difference(
+            rms_N=whole**0.5,
+            share_of_peak=whole**0.5 / self.first.force,
+            noise_N=noise**0.5,
+            left_N=left**0.5,
+            explained=float(np.clip(explained, 0.0, 1.0)),
+        )
+
+    def _left_share(self, difference: Difference) -> float:
+        whole = difference.rms_N**2 - difference.noise_N**2
+        left = max(difference.left_N**2 - difference.noise_N**2, 0.0)
+        return float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
+
+    def _is_visible(self, difference: Difference) -> bool:
+        """Whether what the states differ by is beyond noise, and beyond what two tests of one state differ by."""
+        beyond = max(difference.rms_N**2 - difference.noise_N**2, 0.0) ** 0.5
+        columns = self.search.regression.likelihood.columns
+        tests = float(np.sqrt(np.mean([np.sum((self.best.scatter.tests * A) ** 2) for A in columns])))
+        return bool(beyond > max(self.diagnose.visible * self.first.force, LEVEL * tests))
+
+    def _settled(self) -> tuple[Fitted, dict[str, list[str]]]:
+        """Return the changes with those of the damper in the place of the stand's where something tells, and rivals."""
+        best = self._gas(self.best)
+        rivals: dict[str, list[str]] = {}
+        for candidate in best.candidates:
+            names = [
+                name
+                for fitted in self.search.rivals(best, candidate)
+                for name in _added(fitted, best)
+                if not self._same_gas(best, candidate, name)
+            ]
+            if names:
+                rivals[candidate.name] = list(dict.fromkeys(names))
+        return best, rivals
+
+    def _gas(self, best: Fitted) -> Fitted:
+        """Put a gas force in the place of a load-cell zero beside a gas spring that changed as that of a gas does."""
+        names = {c.name for c in best.candidates}
+        if "load_cell_zero" not in names or "gas_spring" not in names:
+            return best
+        zero = next(c for c in best.candidates if c.name == "load_cell_zero")
+        (preload, *_), less = (
+            [c for c in self.search.candidates if c.name == "preload_offset"],
+            self.search.without(best, zero),
+        )
+        swapped = self.search.regression.fit(
+            (*less.candidates, preload), np.concatenate([less.values, [0.0]]), best.scatter
+        )
+        return swapped if self._is_gas(swapped) else best
+
+    def _is_gas(self, fitted: Fitted) -> bool:
+        """Whether force and stiffness beside the element changed in the proportion of a gas column.
+
+        Equation: dF_0 = - dk_g L / 1.3, L the length of the gas column
+        """
+        changed = {c.parameter: x * c.scale for c, x in zip(fitted.coordinates, fitted.values, strict=True)}
+        if "F_0" not in changed or "k_g" not in changed or changed["k_g"] == 0.0:
+            return False
+        length = -POLYTROPIC * changed["F_0"] / changed["k_g"]
+        half_stroke = max(c.amplitude for c in self.comparisons)
+        return bool(GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke)
+
+    def _same_gas(self, best: Fitted, candidate: Candidate, rival: str) -> bool:
+        return candidate.name == "preload_offset" and rival == "load_cell_zero" and self._is_gas(best)
+
+    # --- Tables
+
+    def _reported(self, best: Fitted) -> list[Change]:
+        if not best.candidates:
+            return []
+        covariance = self.search.regression.covariance(best)
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
+        found = []
+        for candidate in best.candidates:
+            less = self.search.without(best, candidate)
+            share = float(np.clip((less.mean_square - best.mean_square) / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+            for name, parameter in candidate.key:
+                mine = [
+                    (c, float(x), float(e))
+                    for c, x, e in zip(best.coordinates, best.values, errors, strict=True)
+                    if (c.name, c.parameter) == (name, parameter)
+                ]
+                found.append(self._change(mine, share))
+        unique = {(c.name, c.parameter): c for c in found}
+        return list(unique.values())
+
+    def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
+        c = mine[0][0]
+        at, start, to, low, high = self._values(mine)
+        name, parameter, unit = c.name, c.parameter, self.control.own_unit(c.unit)
+        if c.name == "temperature":
+            parameter, unit = "temperature", "degC"
+        visible = "beyond what the tests of one state differ by"
+        return Change(
+            name=name,
+            parameter=parameter,
+            of=c.of,
+            unit=unit,
+            from_=start,
+            to=to,
+            low95=low,
+            high95=high,
+            at_voltage_V=at,
+            share=share,
+            reason=f"adopted: it makes {100.0 * share:.3g} % of the difference, {visible}",
+        )
+
+    def _values(
+        self, mine: Sequence[tuple[Coordinate, float, float]]
+    ) -> tuple[tuple[float, ...] | None, Numbers, Numbers, Numbers, Numbers]:
+        """Return the voltages, and the value in the first state, in the second, and the ends of its interval."""
+        c, x, e = mine[0]
+        if c.name == "temperature":
+            start, to = self._temperatures()
+            return None, start, to, to, to
+        if c.of == "stand":
+            return None, 0.0, x * c.scale, (x - LEVEL * e) * c.scale, (x + LEVEL * e) * c.scale
+        if c.name in ELEMENT_COLUMNS:
+            return self._element_values(mine)
+        own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
+        if isinstance(own, tuple):
+            ends = np.sort([[v * (1.0 + x + s * LEVEL * e) for v in own] for s in (-1.0, 0.0, 1.0)], axis=0)
+            at = cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
+            return at, own, tuple(ends[1].tolist()), tuple(ends[0].tolist()), tuple(ends[2].tolist())
+        neutral = known_parameter(c.name, c.parameter).neutral
+        start_value = own if own is not None else (neutral if np.isfinite(neutral) else None)
+        low, to, high = sorted(parameter_value(c, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0))
+        return None, start_value, to, low, high
+
+    def _element_values(
+        self, mine: Sequence[tuple[Coordinate, float, float]]
+    ) -> tuple[tuple[float, ...] | None, Numbers, Numbers, Numbers, Numbers]:
+        c = mine[0][0]
+        column = list(ELEMENT_COLUMNS).index(c.name)
+        voltages = self._voltages()
+        groups = rows_per_voltage(self.first.damper.base)
+        temperature = self._temperatures()[0]
+
+        def at(values: Sequence[float]) -> list[float]:
+            damper = self.first.changed([each for each, _, _ in mine], values, None)
+            return [float(element_of(damper, v, temperature)[column]) for v in voltages]
+
+        start = at([0.0] * len(mine))
+        ends = [at([x + s * LEVEL * e for _, x, e in mine]) for s in (0.0, -1.0, 1.0)]
+        to = ends[0]
+        low = [min(a, b) for a, b in zip(ends[1], ends[2], strict=True)]
+        high = [max(a, b) for a, b in zip(ends[1], ends[2], strict=True)]
+        if len(groups) < 2 or len(voltages) < 2:
+            return None, start[0], to[0], low[0], high[0]
+        return tuple(cast("list[float]", voltages)), tuple(start), tuple(to), tuple(low), tuple(high)
+
+    def _voltages(self) -> list[float | None]:
+        """Return the control signals of the compared tests at which the first state has parameters."""
+        groups = [voltage for voltage, _ in rows_per_voltage(self.first.damper.base)]
+        known = sorted(
+            {min(groups, key=lambda g: abs(g - c.voltage)) for c in self.comparisons if c.voltage is not None}  # type: ignore[operator]  # not None
+        )
+        return list(known) or [None]
+
+    def _temperatures(self) -> tuple[float | None, float | None]:
+        """Return the mean temperatures of the compared tests in both states [degC]."""
+        before = [c.temperature for c in self.comparisons if c.temperature is not None]
+        warmer = [c.warmer for c in self.comparisons if c.warmer is not None]
+        if not before or not warmer:
+            return (float(np.mean(before)) if before else None), None
+        return float(np.mean(before)), float(np.mean(before) + np.mean(warmer))
+
+    def _displacement_zero(self) -> list[Change]:
+        """Return the shift of the mean displacement, where it is large: the zero of its sensor, or of the stroke."""
+        shifts = np.array([c.displacement_zero for c in self.comparisons if c.before is not None])
+        if not shifts.size:
+            return []
+        mean = float(np.mean(shifts))
+        spread = float(np.std(shifts, ddof=1)) / np.sqrt(shifts.size) if shifts.size > 1 else 0.0
+        if abs(mean) < max(ZERO_SHARE * max(c.amplitude for c in self.comparisons), 2.0 * LEVEL * spread):
+            return []
+        return [
+            Change(
+                name="displacement_zero", parameter="displacement_zero", of="stand", unit="m", from_=0.0, to=mean,
+                low95=mean - LEVEL * spread, high95=mean + LEVEL * spread, share=0.0,
+                reason="the displacement has another middle; forces are compared about the middle of each",
+            )
+        ]  # fmt: skip
+
+    def _unchanged(self, best: Fitted) -> tuple[Unchanged, ...]:
+        """List what would have shown a visible change, and has not changed visibly."""
+        regression = self.search.regression
+        whiteners = regression.likelihood.whiteners(best.scatter)
+        frame = np.zeros((regression.likelihood.size, 0))
+        if best.coordinates:
+            frame = np.linalg.qr(regression.jacobian(best.coordinates, best.values, whiteners)).Q
+        residual = np.concatenate([W @ r for W, r in zip(whiteners, best.residuals, strict=True)])
+        changed = {key for candidate in best.candidates for key in candidate.key}
+        found: dict[tuple[str, str], Unchanged] = {}
+        for candidate in self.search.candidates:
+            if candidate.of == "stand" or candidate.per_voltage or len(candidate.coordinates) > 1:
+                continue
+            (c,) = candidate.coordinates
+            if candidate.key[0] in changed or candidate.key[0] in found or c.name == "temperature":
+                continue
+            if candidate.absent and c.logarithmic:
+                continue
+            together = (*best.coordinates, c)
+            columns = [own[:, -1] for own in regression.columns(together, np.append(best.values, 0.0))]
+            own = np.concatenate([W @ column for W, column in zip(whiteners, columns, strict=True)])
+            own = own - frame @ (frame.T @ own)
+            force = np.sqrt(np.mean([col @ col / k.peak**2 for col, k in zip(columns, self.comparisons, strict=True)]))
+            if not own @ own > 0.0 or not force > 0.0:
+                continue
+            error, x = float(1.0 / np.sqrt(own @ own)), float(own @ residual / (own @ own))
+            most = self.diagnose.visible / float(force)
+            if most > SHOWN or LEVEL * error > most or abs(x) > most:
+                continue
+            at, start, to, low, high = self._values([(c, x, error)])
+            found[candidate.key[0]] = Unchanged(
+                name=c.name, parameter=c.parameter, unit=self.control.own_unit(c.unit), from_=start, to=to,
+                low95=low, high95=high, at_voltage_V=at,
+            )  # fmt: skip
+        return tuple(found.values())
+
+    # --- Words
+
+    def _reason(
+        self, verdict: Verdict, listed: Sequence[Change], rivals: dict[str, list[str]], difference: Difference
+    ) -> str:
+        of_damper = list(dict.fromkeys(c.name for c in listed if c.of == "damper"))
+        of_stand = list(dict.fromkeys(c.name for c in listed if c.of == "stand"))
+        size = f"the force differs by {difference.rms_N:.3g} N r.m.s., {100.0 * difference.share_of_peak:.2g} % of peak"
+        told = [f"{size}, of which {difference.left_N:.2g} N are left, {difference.noise_N:.2g} N of them noise"]
+        if of_damper:
+            told.append(f"of the damper: {', '.join(of_damper)}")
+        elif verdict == "unchanged":
+            told.append("nothing of the damper changed visibly")
+        if of_stand:
+            told.append(f"of the stand: {', '.join(of_stand)}")
+        for name, others in rivals.items():
+            told.append(f"{name} cannot be told from {' or '.join(others)} by these tests")
+        if verdict == "unexplained":
+            told.append("what is left has no name")
+        temperatures = self._temperatures()
+        if None not in temperatures and abs(temperatures[1] - temperatures[0]) > 0.5:  # type: ignore[operator]  # not None
+            told.append(f"the damper was at {temperatures[1]:.3g} degC instead of {temperatures[0]:.3g}")
+        pairs = sum(c.before is not None for c in self.comparisons)
+        told.append(
+            f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"
+        )
+        return "; ".join(told)
+
+    def cycles(self) -> tuple[ComparedCycle, ...]:
+        """Return the compared cycles over their phase, with the difference that the changes make."""
+        found = []
+        for c, made in zip(self.comparisons, self.best.differences, strict=True):
+            points = c.motion.time.size - c.begin
+            found.append(
+                ComparedCycle(
+                    c.before,
+                    c.after,
+                    c.voltage,
+                    c.motion.displacement[c.begin :],
+                    c.motion.velocity[c.begin :],
+                    course(c.reference, points),
+                    course(c.measured, points),
+                    course(unstacked(made), points),
+                )
+            )
+        return tuple(found)
+
+
+def _added(fitted: Fitted, best: Fitted) -> list[str]:
+    mine = {c.name for c in best.candidates}
+    return [c.name for c in fitted.candidates if c.name not in mine]

@@ -1,0 +1,264 @@
+"""Fit of changes to the difference of force: noise, what the tests differ by themselves, and least squares.
+
+The covariance of a stacked difference has three parts: noise from the cycles; offset, gain and delay that any test has
+of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the difference in
+every octave. Both shares are estimated with the changes, so that a difference without a name is not given one.
+
+Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s) + u^2 A A'
+                                                    Source: Gaussian likelihood; A of `pzd.signals.nuisance`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pzd.diagnosis.changes.candidates import Candidate, Coordinate, Response
+from pzd.diagnosis.changes.pairs import Comparison, octave_mean, stacked
+from pzd.record import Array, Complex
+from pzd.signals.nuisance import NuisanceConfig
+
+USUAL_SHARE = 0.3
+"""Share of the priors on offset, gain and delay by which tests of one stand usually differ.
+
+Reason: the priors allow for any stand; a good one repeats its force within half a per cent."""
+SHARE_SCATTER = 0.4
+"""Standard deviation of the logarithm of that share from stand to stand: the whole prior lies three of them away."""
+SHARES = (0.1, 0.17, 0.3, 0.5, 0.75, 1.0)
+"""Shares that are tried."""
+DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
+"""Shares of the difference without a name that are tried, from nothing to all of it."""
+LEAST_VARIANCE = 1e-10
+"""Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
+STEP = 1e-3
+"""Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
+EVALUATIONS = 12
+"""Evaluations of a fit at most; each is a simulation of all comparisons for each coordinate."""
+LEVEL = 1.96
+"""Half width of a 95 % interval in standard errors."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Shares of the covariance that are estimated."""
+
+    tests: float
+    """u: of the priors on offset, gain and delay."""
+    discrepancy: float
+    """g: of the difference, what no candidate explains."""
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Likelihood of the differences of force."""
+
+    comparisons: tuple[Comparison, ...]
+    nuisance: NuisanceConfig
+    known_discrepancy: float
+    """Share of the force that the damper of the first state misses there: of the tests compared with the model."""
+
+    @cached_property
+    def size(self) -> int:
+        """Number of compared numbers."""
+        return sum(c.difference.size for c in self.comparisons)
+
+    @cached_property
+    def _shapes(self) -> tuple[tuple[Array, Array], ...]:
+        """(2 H + 1,) mean square of difference and force in the octave about every harmonic [N^2]."""
+        return tuple((_by_octave(c.measured - c.reference), _by_octave(c.reference)) for c in self.comparisons)
+
+    @cached_property
+    def columns(self) -> tuple[Array, ...]:
+        """(2 H + 1, 3) difference by one standard deviation of offset, gain and delay of each of two tests [N]."""
+        found = []
+        for c in self.comparisons:
+            offset = np.zeros(c.difference.size)
+            offset[0] = self.nuisance.offset * c.peak
+            late = stacked(-1j * c.rate * c.reference) * self.nuisance.delay_s
+            tests = np.sqrt(2.0) if c.before is not None else 1.0
+            found.append(tests * np.column_stack([offset, self.nuisance.gain * stacked(c.reference), late]))
+        return tuple(found)
+
+    def diagonal(self, at: int, scatter: Scatter) -> Array:
+        """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
+        c, (difference, force) = self.comparisons[at], self._shapes[at]
+        missed = scatter.discrepancy**2 * difference
+        if c.before is None:
+            missed = missed + self.known_discrepancy**2 * force
+        return np.asarray(c.variance + missed + LEAST_VARIANCE * c.peak**2)
+
+    def deviance(self, residuals: Sequence[Array], scatter: Scatter) -> float:
+        """Return -2 ln L of (2 H + 1,) residuals, up to a constant, with the prior on how tests differ."""
+        total = (np.log(scatter.tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
+        for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
+            D = self.diagonal(i, scatter)
+            U = scatter.tests * A
+            weighed = U / D[:, None]
+            inner = np.eye(U.shape[1]) + U.T @ weighed
+            pull = weighed.T @ r
+            total += float(r @ (r / D)) - float(pull @ np.linalg.solve(inner, pull))
+            total += float(np.sum(np.log(D))) + float(np.linalg.slogdet(inner)[1])
+        return float(total)
+
+    def best_scatter(self, residuals: Sequence[Array]) -> tuple[Scatter, float]:
+        """Return the likeliest scatter of some residuals on a grid, and -2 ln L there."""
+        tried = [Scatter(u, g) for u in SHARES for g in DISCREPANCIES]
+        found = [self.deviance(residuals, each) for each in tried]
+        best = int(np.argmin(found))
+        return tried[best], found[best]
+
+    def whiteners(self, scatter: Scatter) -> list[Array]:
+        """Return for every comparison the (2 H + 1, 2 H + 1) matrix that makes its residual white."""
+        found = []
+        for i, A in enumerate(self.columns):
+            V = np.diag(self.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T
+            found.append(np.linalg.inv(np.linalg.cholesky(V)))
+        return found
+
+
+def _by_octave(spectrum: Complex) -> Array:
+    """Return the (2 H + 1,) mean square of a spectrum in the octave about every harmonic."""
+    power = octave_mean(np.abs(spectrum) ** 2)
+    return np.concatenate([power, power[1:]])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Some changes fitted together."""
+
+    candidates: tuple[Candidate, ...]
+    values: Array
+    """(p,) of their coordinates."""
+    differences: tuple[Array, ...]
+    """(2 H + 1,) difference that they make in every comparison [N]."""
+    residuals: tuple[Array, ...]
+    """(2 H + 1,) what they leave [N]."""
+    scatter: Scatter
+    bic: float
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """All coordinates."""
+        return coordinates_of(self.candidates)
+
+    def values_of(self, candidate: Candidate) -> Array:
+        """Return the values of one candidate's coordinates."""
+        return self.values[[self.coordinates.index(c) for c in candidate.coordinates]]
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of what is left, over the comparisons [N^2]."""
+        return float(np.mean([r @ r for r in self.residuals]))
+
+
+def coordinates_of(candidates: Sequence[Candidate]) -> tuple[Coordinate, ...]:
+    """Return the coordinates of several candidates."""
+    return tuple(c for candidate in candidates for c in candidate.coordinates)
+
+
+@dataclass(eq=False)
+class Regression:
+    """Fits of changes to the differences of force."""
+
+    likelihood: Likelihood
+    response: Response
+
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """What is compared."""
+        return self.likelihood.comparisons
+
+    def fit(self, candidates: Sequence[Candidate], start: Array, scatter: Scatter) -> Fitted:
+        """Fit some changes by least squares, the scatter estimated in turn.
+
+        Parameters
+        ----------
+        candidates : which
+        start : (p,) values of the coordinates
+        scatter : with which the fit begins
+        """
+        from scipy.optimize import least_squares
+
+        candidates = tuple(candidates)
+        coordinates = coordinates_of(candidates)
+        x = start
+        if coordinates:
+            low = np.array([c.low for c in coordinates])
+            high = np.array([c.high for c in coordinates])
+            margin = 1e-9 * np.where(np.isfinite(high - low), high - low, 1.0)
+            x = np.clip(start, low + margin, high - margin)
+            for _ in range(2):
+                whiteners = self.likelihood.whiteners(scatter)
+
+                def residual(x: Array, whiteners: list[Array] = whiteners) -> Array:
+                    made = self.response.of(coordinates, x.tolist())
+                    return np.concatenate(
+                        [W @ (c.difference - d) for W, c, d in zip(whiteners, self.comparisons, made, strict=True)]
+                    )
+
+                def slopes(x: Array, whiteners: list[Array] = whiteners) -> Array:
+                    return -self.jacobian(coordinates, x, whiteners)
+
+                found = least_squares(
+                    residual, x, jac=slopes, bounds=(low, high), x_scale="jac", xtol=1e-5, ftol=1e-5, gtol=1e-8,
+                    max_nfev=EVALUATIONS,
+                )  # fmt: skip
+                x = found.x
+                left = self._left(coordinates, x)
+                new, _ = self.likelihood.best_scatter(left[1])
+                if new == scatter:
+                    break
+                scatter = new
+        made, residuals = self._left(coordinates, x)
+        scatter, deviance = self.likelihood.best_scatter(residuals)
+        penalty = len(coordinates) * float(np.log(self.likelihood.size))
+        return Fitted(candidates, x, made, residuals, scatter, deviance + penalty)
+
+    def _left(self, coordinates: Sequence[Coordinate], x: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        made = self.response.of(coordinates, x.tolist())
+        return made, tuple(c.difference - d for c, d in zip(self.comparisons, made, strict=True))
+
+    def jacobian(self, coordinates: Sequence[Coordinate], x: Array, whiteners: Sequence[Array]) -> Array:
+        """Compute the (w, p) derivatives of the whitened difference by the coordinates."""
+        columns = self.columns(coordinates, x)
+        return np.concatenate([W @ own for W, own in zip(whiteners, columns, strict=True)])
+
+    def columns(self, coordinates: Sequence[Coordinate], x: Array) -> list[Array]:
+        """Compute for every comparison the (2 H + 1, p) derivatives of the difference by the coordinates [N]."""
+        per_coordinate = []
+        for j, c in enumerate(coordinates):
+            ends = np.array([max(x[j] - STEP, c.low), min(x[j] + STEP, c.high)])
+            before, after = (
+                self.response.of(coordinates, [*x[:j].tolist(), float(end), *x[j + 1 :].tolist()]) for end in ends
+            )
+            width = float(ends[1] - ends[0])
+            per_coordinate.append([(b - a) / width for a, b in zip(before, after, strict=True)])
+        return [np.column_stack([each[i] for each in per_coordinate]) for i in range(len(self.comparisons))]
+
+    def covariance(self, fitted: Fitted) -> Array:
+        """Compute the (p, p) covariance of the coordinates, wider where the tests disagree by more than the scatter.
+
+        Equation: (J' J)^-1 max(1, |r|^2 / (n - p), R_j), R_j of the tests' pulls
+                                            Source: Birge 1932; cluster-robust variance, Bell and McCaffrey 2002
+        """
+        whiteners = self.likelihood.whiteners(fitted.scatter)
+        J = self.jacobian(fitted.coordinates, fitted.values, whiteners)
+        covariance = np.linalg.pinv(J.T @ J, rcond=1e-13, hermitian=True)
+        r = [W @ each for W, each in zip(whiteners, fitted.residuals, strict=True)]
+        whole = np.concatenate(r)
+        wider = max(1.0, float(whole @ whole) / max(whole.size - fitted.values.size, 1))
+        ends = np.cumsum([each.size for each in r])[:-1]
+        pulled, allowed = np.zeros(J.shape[1]), np.zeros(J.shape[1])
+        for own, residual in zip(np.split(J, ends), r, strict=True):
+            pull = own @ covariance
+            alone, shared = np.sum(pull**2, axis=0), own.T @ pull
+            chance = alone - np.sum(shared * (covariance @ shared), axis=0)
+            counts = chance > 1e-6 * alone
+            pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
+            allowed += np.where(counts, chance, 0.0)
+        disagree = np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)
+        spread = np.sqrt(np.maximum(disagree, wider))
+        return np.asarray(covariance * np.outer(spread, spread))

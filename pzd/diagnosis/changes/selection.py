@@ -1,0 +1,238 @@
+"""Which changes explain the difference: forward selection with exchange, support of each, and rivals.
+
+A step adopts the change that lowers the Bayesian criterion most; then each adopted one is left out, or put in the place
+of another, until nothing improves. A linearised step tells beforehand which candidates are worth a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
+from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
+from pzd.diagnosis.fit.least_squares import projected_out
+from pzd.record import Array
+
+MOST_CHANGES = 4
+"""Changes at once."""
+FITTED = 5
+"""Candidates that are fitted in a step, of those that promise most."""
+SLACK = 30.0
+"""A candidate whose promised criterion is worse than the best by more is not fitted: the promise is linearised."""
+BEAM = 3
+"""Beginnings that are followed to their end where one change leaves something: the best first step may mislead."""
+EXCHANGES = 6
+"""Rounds of the exchange at most; each lowers the criterion."""
+BETTER = 1e-3
+"""Least improvement of the criterion: of two candidates that do the same the first in the list stays."""
+FOLDS = 5
+"""Parts into which the tests are dealt for the prediction of held-out ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What one linearised step towards a candidate would leave."""
+
+    criterion: float
+    """Sum of squares in units of the scatter, with the penalty on its coordinates."""
+    candidate: Candidate
+    start: Array
+    """From which it was taken."""
+
+
+@dataclass(eq=False)
+class Search:
+    """Search for the changes that explain the difference of force."""
+
+    regression: Regression
+    candidates: Sequence[Candidate]
+    adopt_bic: float
+    rival_bic: float
+    visible: float
+    """Least r.m.s. force of a change, as a share of each test's peak."""
+    _starts: dict[Candidate, list[tuple[Array, list[Array]]]] = field(default_factory=dict, repr=False)
+    _fits: dict[frozenset[Candidate], Fitted] = field(default_factory=dict, repr=False)
+
+    def nothing(self) -> Fitted:
+        """Return the fit without any change."""
+        return self._fit((), np.zeros(0), Scatter(USUAL_SHARE, 1.0))
+
+    def _fit(self, candidates: Sequence[Candidate], start: Array, scatter: Scatter) -> Fitted:
+        key = frozenset(candidates)
+        if key not in self._fits:
+            self._fits[key] = self.regression.fit(candidates, start, scatter)
+        return self._fits[key]
+
+    # --- What a candidate promises
+
+    def _promising(self, before: Fitted, tried: Iterable[Candidate], scatter: Scatter) -> list[Promise]:
+        """Return what one linearised step from each candidate's best start would leave, the best first."""
+        whiteners = self.regression.likelihood.whiteners(scatter)
+        r = np.concatenate([W @ each for W, each in zip(whiteners, before.residuals, strict=True)])
+        frame = np.zeros((r.size, 0))
+        if before.coordinates:
+            frame = np.linalg.qr(self.regression.jacobian(before.coordinates, before.values, whiteners)).Q
+        r = projected_out(frame, r)
+        found = []
+        for candidate in tried:
+            best, at = float(r @ r), np.array(candidate.starts[0])
+            for start, columns in self._linearised(candidate):
+                own = projected_out(frame, np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)]))
+                size = np.linalg.norm(own, axis=0)
+                own = own / np.where(size > 0.0, size, 1.0)
+                if not np.all(np.isfinite(own)):
+                    continue
+                left = r - own @ np.linalg.lstsq(own, r, rcond=1e-6)[0]
+                if left @ left < best:
+                    best, at = float(left @ left), start
+            penalty = len(candidate.coordinates) * float(np.log(self.regression.likelihood.size))
+            found.append(Promise(best + penalty, candidate, at))
+        return sorted(found, key=lambda promise: promise.criterion)
+
+    def _linearised(self, candidate: Candidate) -> list[tuple[Array, list[Array]]]:
+        """Return the starts of a candidate with the columns of its differences there, from the first state."""
+        if candidate not in self._starts:
+            made = []
+            coordinates = candidate.coordinates
+            for start in candidate.starts:
+                x = np.array(start)
+                columns = self.regression.columns(coordinates, x)
+                secant = self.regression.response.of(coordinates, x.tolist())
+                if any(np.any(s != 0.0) for s in secant):
+                    columns = [np.column_stack([s, c]) for s, c in zip(secant, columns, strict=True)]
+                made.append((x, columns))
+            self._starts[candidate] = made
+        return self._starts[candidate]
+
+    def _with(self, before: Fitted, promise: Promise) -> Fitted:
+        together = (*before.candidates, promise.candidate)
+        return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
+
+    def _tried(self, before: Fitted) -> list[Candidate]:
+        return [c for c in self.candidates if not any(excludes(c, adopted) for adopted in before.candidates)]
+
+    def _additions(self, before: Fitted) -> list[Fitted]:
+        """Return the fits with one more change that is visible and physical, the best first."""
+        promising = self._promising(before, self._tried(before), before.scatter)
+        worth = [p for i, p in enumerate(promising) if i < FITTED or p.candidate.name in ELEMENT_COLUMNS]
+        fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._admissible(fitted)]
+        # Of two that do the same, what the stand may have done is not laid to the damper.
+        return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
+
+    # --- The steps
+
+    def run(self) -> Fitted:
+        """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end."""
+        nothing = self.nothing()
+        ends = [self._without_superfluous(self._continued(self._exchanged(f))) for f in self._beginnings(nothing)]
+        return min([nothing, *ends], key=lambda f: f.bic)
+
+    def _beginnings(self, nothing: Fitted) -> list[Fitted]:
+        """Return the best first changes, one alone where it leaves nothing visible."""
+        found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
+        if found and self._left(found[0]) < self.visible:
+            return found[:1]
+        return found[:BEAM]
+
+    def _left(self, fitted: Fitted) -> float:
+        """Return what a fit leaves above noise (r.m.s.), each test in units of its peak."""
+        pairs = zip(fitted.residuals, self.regression.comparisons, strict=True)
+        squares = [max(float(r @ r - np.sum(c.variance)), 0.0) / c.peak**2 for r, c in pairs]
+        return float(np.sqrt(np.mean(squares)))
+
+    def _continued(self, best: Fitted) -> Fitted:
+        """Adopt changes as long as the criterion falls by enough."""
+        while len(best.candidates) < MOST_CHANGES:
+            more = next(iter(self._additions(best)), None)
+            if more is None or more.bic - best.bic > self.adopt_bic:
+                break
+            best = self._exchanged(more)
+        return best
+
+    def _exchanged(self, best: Fitted) -> Fitted:
+        """Put other candidates in the place of each adopted one until nothing improves."""
+        for _ in range(EXCHANGES):
+            tried = [fitted for c in best.candidates for fitted in self._additions(self.without(best, c))[:1]]
+            better = min(tried, key=lambda f: f.bic, default=best)
+            if better.bic > best.bic - BETTER - 1e-6 * abs(best.bic):
+                return best
+            best = better
+        return best
+
+    def _without_superfluous(self, best: Fitted) -> Fitted:
+        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence."""
+        while best.candidates:
+            fewer = [(self.without(best, c), c) for c in best.candidates]
+            doubtful = [
+                less
+                for less, c in fewer
+                if best.bic - less.bic > self.adopt_bic or not self._visible(best, c) or not self._predicts(best, c)
+            ]
+            if not doubtful:
+                return best
+            best = min(doubtful, key=lambda f: f.bic)
+        return best
+
+    def without(self, fitted: Fitted, candidate: Candidate) -> Fitted:
+        """Return the fit without one of its changes, the others fitted again."""
+        kept = tuple(c for c in fitted.candidates if c is not candidate)
+        start = np.concatenate([fitted.values_of(c) for c in kept]) if kept else np.zeros(0)
+        return self._fit(kept, start, fitted.scatter)
+
+    def _admissible(self, fitted: Fitted) -> bool:
+        """Whether the last change of a fit is visible, and physical."""
+        first = self.regression.response.first
+        natural = first.is_natural(fitted.coordinates, fitted.values.tolist())
+        return natural and self._visible(fitted, fitted.candidates[-1])
+
+    def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
+        return self.size_of(fitted, candidate) >= self.visible
+
+    def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
+        """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
+        coordinates = fitted.coordinates
+        off = [0.0 if c in candidate.coordinates else float(x) for c, x in zip(coordinates, fitted.values, strict=True)]
+        kept = [(c, x) for c, x in zip(coordinates, off, strict=True) if c not in candidate.coordinates]
+        others = self.regression.response.of([c for c, _ in kept], [x for _, x in kept])
+        squares = [
+            float(np.sum((d - o) ** 2)) / c.peak**2
+            for c, d, o in zip(self.regression.comparisons, fitted.differences, others, strict=True)
+        ]
+        return float(np.sqrt(np.mean(squares)))
+
+    def _predicts(self, fitted: Fitted, candidate: Candidate) -> bool:
+        """Whether held-out tests are predicted better with a change than without, the rest fitted alike.
+
+        To first order about the optimum; a coordinate that the other tests do not show is left out of the count.
+        """
+        tests = len(self.regression.comparisons)
+        if tests < 2 or candidate.per_voltage:
+            return True
+        whiteners = self.regression.likelihood.whiteners(fitted.scatter)
+        columns = self.regression.columns(fitted.coordinates, fitted.values)
+        J = [W @ c for W, c in zip(whiteners, columns, strict=True)]
+        target = [W @ r + own @ fitted.values for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)]
+        kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
+        gain = 0.0
+        for fold in range(min(FOLDS, tests)):
+            held = [i for i in range(tests) if i % FOLDS == fold]
+            seen = [i for i in range(tests) if i % FOLDS != fold]
+            A, b = np.concatenate([J[i] for i in seen]), np.concatenate([target[i] for i in seen])
+            B, y = np.concatenate([J[i] for i in held]), np.concatenate([target[i] for i in held])
+            full = y - B @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
+            less = y - B[:, kept] @ np.linalg.lstsq(A[:, kept], b, rcond=1e-10)[0] if kept.any() else y
+            gain += float(less @ less - full @ full)
+        return gain > 0.0
+
+    def rivals(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
+        """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
+        less = self.without(best, candidate)
+        tried = [c for c in self._tried(less) if c.name != candidate.name]
+        own = self._promising(less, [candidate], best.scatter)[0]
+        limit = own.criterion + self.rival_bic + SLACK
+        promising = [p for p in self._promising(less, tried, best.scatter) if p.criterion < limit][: 2 * FITTED]
+        fits = [self._with(less, p) for p in promising]
+        return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic and self._admissible(fitted)]

@@ -1,0 +1,103 @@
+"""One state of a damper: its tests, and the damper that was identified and diagnosed from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.artefacts import Identified, Rig
+from pzd.artefacts.identified import identified_damper
+from pzd.damper.effect import Scales
+from pzd.damper.effects import library
+from pzd.damper.model import Damper, Effects
+from pzd.diagnosis import data
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.data import PreparedRecord
+from pzd.identification.config import IdentifyConfig
+from pzd.quantities import Control
+from pzd.record import Record, mid_stroke, voltage_scale
+from pzd.rig.config import RigConfig
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One state of a damper."""
+
+    name: str
+    prepared: tuple[PreparedRecord, ...]
+    damper: Damper
+    """As identified and diagnosed; its T0, C and k where nobody diagnosed."""
+    voltage_scale: float
+    """Of all its records [V]."""
+    undetermined: tuple[str, ...] = ()
+    """Conditions whose T0 or C is undetermined, in words."""
+
+    @classmethod
+    def of(cls, name: str, rig: Rig, identified: Identified, setting: str | None, control: Control) -> State:
+        """Return a state with the damper that identify found."""
+        records, _ = data.unsaturated_records(rig, setting)
+        rows = tuple(row for row in identified.rows if row.setting == setting)
+        lacking = [f"{row.words(control, name)}: {row.status}" for row in rows if None in (row.T0_N, row.C_Ns_per_m)]
+        damper = identified_damper(identified, setting)
+        return cls(name, data.prepare(records), damper, voltage_scale(records), tuple(lacking))
+
+    @property
+    def records(self) -> list[Record]:
+        """The cleaned records."""
+        return [p.record for p in self.prepared]
+
+    def scales(self) -> Scales:
+        """Return the magnitudes by which effect parameters are scaled."""
+        zero = mid_stroke(r.displacement for r in self.records)
+        peaks = [float(np.max(np.abs(r.force))) for r in self.records]
+
+        def largest(values: Sequence[float]) -> float:
+            return max(*values, float(np.finfo(float).tiny))
+
+        return Scales(
+            largest(peaks),
+            min(peaks),
+            largest([float(np.max(np.abs(r.velocity))) for r in self.records]),
+            largest([float(np.max(np.abs(r.displacement - zero))) for r in self.records]),
+            largest([float(np.max(np.abs(r.acceleration))) for r in self.records]),
+            float(np.median([row.C_Ns_per_m for row in self.damper.base])),
+            self.voltage_scale,
+        )
+
+
+def diagnosed_state(
+    state: State,
+    rig: Rig,
+    identified: Identified,
+    setting: str | None,
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    stand: RigConfig,
+    control: Control,
+    jobs: int,
+) -> State:
+    """Return the state with the effects that a diagnosis in memory adopts, which the first state needs."""
+    from pzd.diagnosis.stage import diagnose as run_stage
+
+    found = run_stage(diagnose, identify, stand, rig, identified, control, setting, jobs)
+    return replace(state, damper=found.damper)
+
+
+def about(damper: Damper, zero: float) -> Damper:
+    """Return the same damper with the force and stiffness beside the element about another displacement [m].
+
+    Equation: F_0 + k_g (x - z) = (F_0 + k_g (z' - z)) + k_g (x - z')
+    """
+    if any(name in library() and library()[name].needs_displacement_zero for name in damper.effects):
+        return damper
+    effects: Effects = {name: dict(values) for name, values in damper.effects.items()}
+    stiffness = effects.get("gas_spring", {}).get("k_g", 0.0)
+    force = effects.get("preload_offset", {}).get("F_0", 0.0)
+    if isinstance(stiffness, tuple) or isinstance(force, tuple):
+        return damper
+    moved = stiffness * (zero - damper.zero_m)
+    if moved != 0.0 or "preload_offset" in effects:
+        effects["preload_offset"] = {"F_0": force + moved}
+    return damper.model_copy(update={"effects": effects, "zero_m": zero})

@@ -1,0 +1,181 @@
+"""The page of `pzd changes`: both loops, the difference before and after naming, a bar per change, and the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pzd.artefacts.changes import Change, Changes, Numbers, Unchanged
+from pzd.diagnosis.changes.comparison import Compared, ComparedCycle
+from pzd.quantities import Control
+from pzd.report.blocks import (
+    DASH,
+    Block,
+    Card,
+    Gallery,
+    Notes,
+    Paragraph,
+    Section,
+    TextTable,
+    amount,
+    listed,
+    number,
+    percent,
+    sentence,
+    spelled,
+)
+from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
+from pzd.report.page import render
+
+SHOWN = 4
+"""Motions that are drawn: those with the largest difference."""
+_FOOTER = "Written by pzd changes. Every number of this page stands in the JSON beside it, or in the records."
+_HEADLINES = {
+    "changed": "Something changed",
+    "unchanged": "Nothing of the damper changed visibly",
+    "ambiguous": "Something changed, and these tests leave open what",
+    "unexplained": "Something changed that has no name",
+}
+
+
+def changes_page(found: Compared, control: Control) -> str:
+    """Write the page as HTML.
+
+    Parameters
+    ----------
+    found : what changed, and the compared cycles
+    control : the control signal, for its unit
+    """
+    changes = found.changes
+    cycles = sorted(found.cycles, key=lambda cycle: -_rms(cycle.force_after - cycle.force_before))
+    with styled():
+        loops = tuple(encoded(_loop(cycle, control)) for cycle in cycles[:SHOWN])
+        differences = tuple(encoded(_difference(cycle, control)) for cycle in cycles[:SHOWN])
+        bars = tuple(encoded(panel) for panel in _bars(changes))
+    table: list[Block] = [_quantities(changes, control)] if changes.changes or changes.unchanged else []
+    sections = [
+        Section("what", "What changed", (Paragraph(sentence(changes.reason)), *table, Gallery(bars))),
+        Section("cycles", "Cycle by cycle", (Gallery(loops), Gallery(differences))),
+        Section("trade", "Force at peak velocity", (_trade(found.cycles, control),)),
+    ]
+    if found.undetermined:
+        sections.append(Section("trust", "Not to be trusted", (Notes(found.undetermined, "care"),)))
+    title = f"What changed from {changes.from_} to {changes.to}"
+    return render(title, _cards(changes), (), tuple(sections), _FOOTER)
+
+
+def _cards(changes: Changes) -> tuple[Card, ...]:
+    names = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "damper")))
+    stand = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "stand")))
+    d = changes.difference
+    size = f"{amount(d.rms_N, 'N')} r.m.s., {percent(d.share_of_peak)} of peak"
+    left = f"{amount(d.left_N, 'N')} of it are left, {amount(d.noise_N, 'N')} of them noise."
+    found = [
+        Card("What changed?", names or _HEADLINES[changes.verdict], f"{_HEADLINES[changes.verdict]}."),
+        Card("How much?", size, left),
+    ]
+    if stand:
+        found.append(Card("What did the stand do?", stand, "This is not the damper's."))
+    if changes.rivals:
+        rivals = listed([spelled(name) for name in changes.rivals], "or")
+        found.append(Card("What else may it have been?", rivals, "These tests cannot tell them apart."))
+    same = listed(list(dict.fromkeys(f"{spelled(u.name)} {u.parameter}".strip() for u in changes.unchanged)))
+    if same:
+        found.append(Card("What stayed as it was?", same, "A visible change of these would have shown."))
+    return tuple(found)
+
+
+# --- Tables
+
+
+def _quantities(changes: Changes, control: Control) -> TextTable:
+    header = ("quantity", control.name, "before", "after", "95 % interval", "change", "in %", "share")
+    listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
+    rows = [row for each in listed_rows for row in _rows(each, control)]
+    return TextTable("Each quantity before and after; those without a share did not change", header, tuple(rows))
+
+
+def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...]]:
+    count = len(each.at_voltage_V) if each.at_voltage_V is not None else 1
+    name = spelled(each.name) if each.name == each.parameter else f"{spelled(each.name)} {each.parameter}"
+    share = percent(each.share) if isinstance(each, Change) else DASH
+    for i in range(count):
+        start, to, low, high = (_at(values, i) for values in (each.from_, each.to, each.low95, each.high95))
+        change = None if start is None or to is None else to - start
+        relative = None if change is None or not start else change / abs(start)
+        at = amount(each.at_voltage_V[i], control.unit) if each.at_voltage_V is not None else DASH
+        interval = f"{number(low, 4)} to {number(high, 4)}"
+        yield (
+            name, at, amount(start, each.unit, 4), amount(to, each.unit, 4), interval, amount(change, each.unit),
+            percent(relative), share,
+        )  # fmt: skip
+
+
+def _at(values: Numbers, index: int) -> float | None:
+    return values[index] if isinstance(values, tuple) else values
+
+
+def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
+    """Return force at peak velocity, as the trade reads it: rebound and compression before, after, and in %."""
+    header = ("test", control.name, "velocity", "rebound before", "after", "%", "compression before", "after", "%")
+    rows = []
+    for cycle in sorted(cycles, key=lambda c: (c.voltage or 0.0, float(np.max(c.velocity)))):
+        cells = []
+        for at in (int(np.argmax(cycle.velocity)), int(np.argmin(cycle.velocity))):
+            before, after = float(cycle.force_before[at]), float(cycle.force_after[at])
+            cells += [amount(before, "N"), amount(after, "N"), percent((after - before) / abs(before))]
+        at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
+        rows.append((cycle.after, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
+    return TextTable("Force at the peak velocity of each test", header, tuple(rows))
+
+
+# --- Pictures
+
+
+def _loop(cycle: ComparedCycle, control: Control) -> Panel:
+    figure, ax = axes("displacement [mm]", "force [kN]")
+    x = 1000.0 * cycle.displacement
+    ax.plot(x, cycle.force_before / 1000.0, color=MEASURED, label="before")
+    ax.plot(x, cycle.force_after / 1000.0, color=BASELINE, linestyle="--", label="after")
+    legend(figure)
+    name = _name(cycle, control)
+    alt = f"Force over displacement of {name}, before and after."
+    return Panel(figure, f"Both states, {name}", alt, f"{cycle.before or 'The model'} beside {cycle.after}.")
+
+
+def _difference(cycle: ComparedCycle, control: Control) -> Panel:
+    figure, ax = axes("phase of the cycle", "difference [N]")
+    phase = np.arange(cycle.displacement.size) / cycle.displacement.size
+    whole = cycle.force_after - cycle.force_before
+    ax.plot(phase, whole, color=BASELINE, label="difference")
+    ax.plot(phase, cycle.explained, color=FINAL, linestyle="--", label="what the changes make")
+    ax.plot(phase, whole - cycle.explained, color=MUTED, label="left")
+    legend(figure)
+    name = _name(cycle, control)
+    alt = f"Difference of the forces of {name} over the cycle, what the changes make of it, and what is left."
+    return Panel(figure, f"Difference, {name}", alt, f"R.m.s. {amount(_rms(whole), 'N')} before naming.")
+
+
+def _bars(changes: Changes) -> Iterator[Panel]:
+    shares = {f"{spelled(c.name)} ({c.of})": c.share for c in reversed(changes.changes)}
+    if not shares:
+        return
+    figure, ax = axes("share of the difference [%]", height=0.9 + 0.3 * len(shares), labels=tuple(shares), key=0)
+    ax.barh(np.arange(len(shares)), [100.0 * share for share in shares.values()], color=FINAL)
+    ticks_named(ax, tuple(shares))
+    yield Panel(
+        figure,
+        "Share of each change",
+        "Share of the mean square of the difference that is left without each change.",
+        "What is left without each, the others fitted again.",
+    )
+
+
+def _name(cycle: ComparedCycle, control: Control) -> str:
+    speed = amount(float(np.max(cycle.velocity)), "m/s")
+    return speed if cycle.voltage is None else f"{speed}, {amount(cycle.voltage, control.unit)}"
+
+
+def _rms(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,154 @@
+"""What changed is found by name and size, and what did not change is not blamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from states import campaign, drawn_damper, found, names, names_told, scaled
+
+from pzd.artefacts.changes import Change
+from pzd.damper.model import Damper
+from pzd.record import Record
+from pzd.schema.errors import DataError
+
+
+def inside(change: Change, ratio: float, slack: float = 1.0) -> bool:
+    """Whether a ratio of `to` to `from` lies in the interval, widened by a factor, at every voltage."""
+    columns = (change.from_, change.to, change.low95, change.high95)
+    start, to, low, high = (np.atleast_1d(np.asarray(each, dtype=float)) for each in columns)
+    half = 0.5 * slack * (high - low)
+    return bool(np.all(np.abs(to - ratio * start) <= half + 1e-9))
+
+
+def test_the_same_damper_run_twice_did_not_change(rng: np.random.Generator) -> None:
+    for draw in rng.spawn(3):
+        damper = drawn_damper(draw)
+        changes = found(campaign(damper, draw), campaign(damper, draw))
+        assert (changes.verdict, names(changes)) == ("unchanged", [])
+        assert {"T0", "C"} & {each.name for each in changes.unchanged}
+
+
+@pytest.mark.parametrize(("parameter", "factor"), [("T0", 1.12), ("C", 0.85), ("k", 0.7)])
+def test_a_parameter_that_changed_is_named_with_its_size(
+    rng: np.random.Generator, parameter: str, factor: float
+) -> None:
+    column = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}[parameter]
+    for draw in rng.spawn(2):
+        damper = drawn_damper(draw)
+        changes = found(campaign(damper, draw), campaign(scaled(damper, **{column: factor}), draw))
+        if changes.difference.share_of_peak < 0.005:
+            continue  # a rigid damper shows no spring, and one without friction no T0
+        assert changes.verdict == "changed"
+        assert names(changes) == [parameter]
+        assert inside(changes.changes[0], factor, slack=2.0)
+        assert changes.changes[0].share > 0.9
+        assert changes.difference.explained > 0.95
+
+
+EFFECTS: list[tuple[str, dict[str, float], float]] = [
+    ("orifice_quadratic", {"q": 2500.0}, 0.1),
+    ("lash", {"delta": 8e-4}, 0.1),
+    ("asymmetry", {"alpha": 0.08}, 0.1),
+    ("gas_spring", {"k_g": 2500.0}, 0.1),
+]
+
+
+@pytest.mark.parametrize(("name", "values", "within"), EFFECTS, ids=[name for name, _, _ in EFFECTS])
+def test_an_effect_that_is_newly_there_is_named_with_its_size(
+    rng: np.random.Generator, name: str, values: dict[str, float], within: float
+) -> None:
+    damper = drawn_damper(rng)
+    changes = found(campaign(damper, rng), campaign(damper.with_effect(name, values), rng))
+    assert name in names_told(changes)
+    mine = {c.parameter: c for c in changes.changes if c.name == name}
+    for parameter, value in values.items():
+        assert mine[parameter].to == pytest.approx(value, rel=within)
+        assert mine[parameter].from_ == 0.0
+
+
+def test_two_changes_at_once_are_both_named(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    after = scaled(damper, T0_N=0.8).with_effect("gas_spring", {"k_g": 3000.0})
+    changes = found(campaign(damper, rng), campaign(after, rng))
+    assert set(names(changes)) == {"T0", "gas_spring"}
+    assert changes.difference.explained > 0.95
+
+
+def test_a_gas_that_hardens_with_its_pressure_is_the_dampers_and_a_constant_alone_may_be_the_load_cells(
+    rng: np.random.Generator,
+) -> None:
+    damper = drawn_damper(rng)
+    before = campaign(damper, rng)
+    preloaded = damper.with_effect("preload_offset", {"F_0": -60.0})
+    alone = found(before, campaign(preloaded, rng))
+    assert alone.verdict == "ambiguous"
+    assert {"preload_offset", "load_cell_zero"} <= names_told(alone)
+    gas = found(before, campaign(preloaded.with_effect("gas_spring", {"k_g": 1500.0}), rng))
+    assert gas.verdict == "changed"
+    assert {c.parameter: c.to for c in gas.changes}["F_0"] == pytest.approx(-60.0, abs=6.0)
+    assert "load_cell_zero" not in names_told(gas)
+
+
+def test_what_the_stand_did_is_not_laid_to_the_damper(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng).with_effect("preload_offset", {"F_0": 250.0})
+    before, again = campaign(damper, rng), campaign(damper, rng)
+    louder = found(before, [replace(r, force=1.03 * r.force) for r in again])
+    assert names(louder) == [] or louder.verdict == "ambiguous"
+    assert "load_cell_gain" in names_told(louder)
+    later = found(before, [replace(r, force=np.interp(r.time - 0.003, r.time, r.force)) for r in again])
+    assert "recorder_delay" in names_told(later)
+    delay = next((c for c in later.changes if c.name == "recorder_delay"), None)
+    assert delay is None or delay.to == pytest.approx(0.003, rel=0.1)
+
+
+def test_the_zero_of_the_displacement_changes_neither_gas_force_nor_spring(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng).with_effect("gas_spring", {"k_g": 4000.0})
+    moved = [replace(r, displacement=r.displacement + 0.004) for r in campaign(damper, rng)]
+    changes = found(campaign(damper, rng), moved)
+    assert (changes.verdict, names(changes)) == ("unchanged", [])
+    (zero,) = [c for c in changes.changes if c.name == "displacement_zero"]
+    assert zero.to == pytest.approx(0.004, rel=0.01)
+
+
+def test_what_the_model_misses_cancels_where_the_motions_are_equal(rng: np.random.Generator) -> None:
+    """A law outside the library, of a tenth of the peak, in both states: T0 alone is named, with its size."""
+
+    def outside(records: tuple[Record, ...]) -> list[Record]:
+        return [
+            replace(r, force=r.force + 200.0 * np.sin(400.0 * r.displacement) * np.tanh(8.0 * r.velocity))
+            for r in records
+        ]
+
+    damper = drawn_damper(rng)
+    changes = found(outside(campaign(damper, rng)), outside(campaign(scaled(damper, T0_N=1.15), rng)))
+    assert (changes.verdict, names(changes), changes.compared) == ("changed", ["T0"], "cycles")
+
+
+def test_motions_that_were_not_run_before_are_compared_through_the_model(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    other = campaign(scaled(damper, C_Ns_per_m=1.3), rng, motions=((1.3, 0.02), (1.7, 0.03)))
+    changes = found(campaign(damper, rng), other)
+    assert (changes.compared, names(changes)) == ("model", ["C"])
+    some = campaign(scaled(damper, C_Ns_per_m=1.3), rng, motions=((0.5, 0.02), (1.7, 0.03)))
+    assert found(campaign(damper, rng), some).compared == "both"
+
+
+def test_states_without_a_repeating_test_are_refused_with_what_to_do(rng: np.random.Generator) -> None:
+    damper: Damper = drawn_damper(rng)
+    records = campaign(damper, rng)
+    wandering = [replace(r, displacement=0.02 * np.cumsum(rng.standard_normal(r.time.size)) / 30.0) for r in records]
+    with pytest.raises(DataError, match=r"aged: no test repeats.*run a sine"):
+        found(records, wandering)
+
+
+def test_the_result_does_not_hang_on_the_order_of_the_tests(
+    rng: np.random.Generator, seeds: Callable[[int], list[int]]
+) -> None:
+    damper = drawn_damper(rng)
+    before, after = campaign(damper, rng), campaign(scaled(damper, T0_N=1.2), rng)
+    forward, backward = found(before, after), found(before[::-1], after[::-1])
+    assert names(forward) == names(backward)
+    assert forward.changes[0].to == pytest.approx(backward.changes[0].to, rel=1e-3)
