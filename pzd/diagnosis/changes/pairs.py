@@ -44,6 +44,8 @@ SAME_MOTION = 0.1
 """R.m.s. difference of two displacements that count as one motion, as a share of the larger.
 
 Reason: what the model misses, often a tenth of the force, then counts for a hundredth of it."""
+JUMP = 5.0
+"""Multiple of the usual second difference from which two samples lie on either side of a jump."""
 NO_TEST = 1e9
 """Cost of a pair that is not one motion."""
 
@@ -212,6 +214,8 @@ class Comparison:
     """With which the simulations begin [N]."""
     variance: Array
     """(2 H + 1,) variance of the stacked difference by noise of force and displacement [N^2]."""
+    jumps: Array
+    """(2 H + 1, m) difference by one standard deviation of the instants of jumps [N]."""
     peak: float
     """Largest force of the first state [N]."""
     warmer: float | None
@@ -300,6 +304,28 @@ def displacement_variance(damper: Damper, test: AveragedTest, last: int) -> Arra
     return np.asarray(np.mean([np.abs(harmonics(draw) - centre) ** 2 for draw in draws[1:]], axis=0))
 
 
+def jump_columns(test: AveragedTest, last: int, shift: float) -> Array:
+    """Return (2 H + 1, 2) difference by one standard deviation of the instant of all jumps up, and of all down [N].
+
+    A jump of dry friction lies anywhere between two samples.
+
+    Equation: dF_h = J exp(-2 pi i h j / P) / (P sqrt 12), J the jumps at samples j     Source: a uniform instant
+
+    Parameters
+    ----------
+    test : whose samples they are
+    last : highest harmonic
+    shift : of the beginning of its cycle [cycles]
+    """
+    cycle = test.prepared.folded.mean(axis=0)
+    steps = np.roll(cycle, -1) - cycle
+    usual = 1.4826 * float(np.median(np.abs(np.roll(steps, -1) - steps)))
+    jump = np.abs(np.roll(steps, -1) - steps) > JUMP * usual
+    jumps = np.where(jump | np.roll(jump, 1), steps, 0.0) / np.sqrt(12.0)
+    spectra = (np.fft.rfft(np.where(sign * jumps > 0.0, jumps, 0.0))[: last + 1] / cycle.size for sign in (1.0, -1.0))
+    return np.column_stack([stacked(shifted(spectrum, shift)) for spectrum in spectra])
+
+
 def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -> Comparison:
     """Compare the averaged cycles of one motion in two states at equal phase."""
     last = compared_harmonics(before, after)
@@ -334,6 +360,7 @@ def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -
         simulated,
         first,
         np.concatenate([variance, variance[1:]]),
+        np.column_stack([jump_columns(before, last, 0.0), jump_columns(after, last, shift)]),
         float(np.max(np.abs(course(before.error.mean, max(2 * before.error.mean.size, POINTS))))),
         warmer,
         float(after.displacement[0].real) - mean,
@@ -371,6 +398,7 @@ def model_compared(damper: Damper, after: AveragedTest, mean: float, temperature
         simulated,
         float(cycle[0]),
         np.concatenate([variance, variance[1:]]),
+        jump_columns(after, last, 0.0),
         float(np.max(np.abs(force))),
         warmer,
         0.0,

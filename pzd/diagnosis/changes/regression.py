@@ -11,7 +11,7 @@ Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s) + u^2 A A'
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -95,7 +95,7 @@ class Likelihood:
         total = (np.log(scatter.tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
         for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
             D = self.diagonal(i, scatter)
-            U = scatter.tests * A
+            U = np.column_stack([scatter.tests * A, self.comparisons[i].jumps])
             weighed = U / D[:, None]
             inner = np.eye(U.shape[1]) + U.T @ weighed
             pull = weighed.T @ r
@@ -105,16 +105,21 @@ class Likelihood:
 
     def best_scatter(self, residuals: Sequence[Array]) -> tuple[Scatter, float]:
         """Return the likeliest scatter of some residuals on a grid, and -2 ln L there."""
-        tried = [Scatter(u, g) for u in SHARES for g in DISCREPANCIES]
-        found = [self.deviance(residuals, each) for each in tried]
-        best = int(np.argmin(found))
-        return tried[best], found[best]
+        best, least = Scatter(USUAL_SHARE, 0.0), np.inf
+        for _ in range(2):  # one after the other: they are all but independent
+            for tried in ([Scatter(best.tests, g) for g in DISCREPANCIES], [replace(best, tests=u) for u in SHARES]):
+                found = [self.deviance(residuals, each) for each in tried]
+                if min(found) < least:
+                    least = min(found)
+                    best = tried[int(np.argmin(found))]
+        return best, least
 
     def whiteners(self, scatter: Scatter) -> list[Array]:
         """Return for every comparison the (2 H + 1, 2 H + 1) matrix that makes its residual white."""
         found = []
         for i, A in enumerate(self.columns):
-            V = np.diag(self.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T
+            J = self.comparisons[i].jumps
+            V = np.diag(self.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T + J @ J.T
             found.append(np.linalg.inv(np.linalg.cholesky(V)))
         return found
 
@@ -229,13 +234,11 @@ class Regression:
     def columns(self, coordinates: Sequence[Coordinate], x: Array) -> list[Array]:
         """Compute for every comparison the (2 H + 1, p) derivatives of the difference by the coordinates [N]."""
         per_coordinate = []
+        here = self.response.of(coordinates, x.tolist())
         for j, c in enumerate(coordinates):
-            ends = np.array([max(x[j] - STEP, c.low), min(x[j] + STEP, c.high)])
-            before, after = (
-                self.response.of(coordinates, [*x[:j].tolist(), float(end), *x[j + 1 :].tolist()]) for end in ends
-            )
-            width = float(ends[1] - ends[0])
-            per_coordinate.append([(b - a) / width for a, b in zip(before, after, strict=True)])
+            width = STEP if x[j] + STEP <= c.high else -STEP
+            there = self.response.of(coordinates, [*x[:j].tolist(), float(x[j] + width), *x[j + 1 :].tolist()])
+            per_coordinate.append([(b - a) / width for a, b in zip(here, there, strict=True)])
         return [np.column_stack([each[i] for each in per_coordinate]) for i in range(len(self.comparisons))]
 
     def covariance(self, fitted: Fitted) -> Array:

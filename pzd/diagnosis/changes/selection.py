@@ -22,7 +22,7 @@ FITTED = 5
 """Candidates that are fitted in a step, of those that promise most."""
 SLACK = 30.0
 """A candidate whose promised criterion is worse than the best by more is not fitted: the promise is linearised."""
-BEAM = 3
+BEAM = 2
 """Beginnings that are followed to their end where one change leaves something: the best first step may mislead."""
 EXCHANGES = 6
 """Rounds of the exchange at most; each lowers the criterion."""
@@ -140,7 +140,7 @@ class Search:
     def _left(self, fitted: Fitted) -> float:
         """Return what a fit leaves above noise (r.m.s.), each test in units of its peak."""
         pairs = zip(fitted.residuals, self.regression.comparisons, strict=True)
-        squares = [max(float(r @ r - np.sum(c.variance)), 0.0) / c.peak**2 for r, c in pairs]
+        squares = [max(float(r @ r - np.sum(c.variance) - np.sum(c.jumps**2)), 0.0) / c.peak**2 for r, c in pairs]
         return float(np.sqrt(np.mean(squares)))
 
     def _continued(self, best: Fitted) -> Fitted:

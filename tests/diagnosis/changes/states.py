@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -92,23 +91,3 @@ def names(changes: Changes, of: str = "damper") -> list[str]:
 def names_told(changes: Changes) -> set[str]:
     """Names in what changed and among its rivals."""
     return {c.name for c in changes.changes} | set(changes.rivals)
-
-
-CONFIG = """
-seed: 3
-rig:
-  virtual:
-    - {setting: new, damper: {base: [{voltage_V: 0, T0_N: 300, C_Ns_per_m: 2700, k_N_per_m: 200000}]}, voltages_V: [0],
-       tests: &tests [{waveform: {kind: sine, frequency_Hz: 1, amplitude_m: 0.02}, cycles: 5},
-                      {waveform: {kind: sine, frequency_Hz: 2, amplitude_m: 0.02}, cycles: 8}],
-       noise: &noise {force: {share_of_peak: 0.003}}, rate_Hz: 500}
-    - {setting: aged, damper: {base: [{voltage_V: 0, T0_N: 330, C_Ns_per_m: 2700, k_N_per_m: 200000}]}, voltages_V: [0],
-       tests: *tests, noise: *noise, rate_Hz: 500}
-setting: new
-"""
-
-
-def written(folder: Path, text: str = CONFIG, name: str = "damper.yaml") -> Path:
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return path

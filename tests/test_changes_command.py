@@ -1,0 +1,95 @@
+"""`pzd changes` from a config to its files: the contract of the JSON, the page, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+
+STATE = """\
+    - setting: {setting}
+      damper: {{base: [{{voltage_V: 0, T0_N: {friction}, C_Ns_per_m: 2700, k_N_per_m: 200000}}]}}
+      voltages_V: [0]
+      tests:
+        - {{waveform: {{kind: sine, frequency_Hz: 1, amplitude_m: 0.02}}, cycles: 5}}
+        - {{waveform: {{kind: sine, frequency_Hz: 2, amplitude_m: 0.02}}, cycles: 8}}
+      noise: {{force: {{share_of_peak: 0.003}}}}
+      rate_Hz: 500
+"""
+QUICK = "diagnose: {most_effects: 1, most_evaluations: 1}\n"
+TWO = "seed: 3\nrig:\n  virtual:\n" + "".join(
+    STATE.format(setting=s, friction=f) for s, f in (("new", 300), ("aged", 330))
+)
+KEYS = {
+    "verdict", "from", "to", "compared", "difference", "changes", "unchanged", "rivals", "reason", "next_test",
+}  # fmt: skip
+OF_CHANGE = {"name", "parameter", "of", "unit", "from", "to", "low95", "high95", "at_voltage_V", "share", "reason"}
+
+
+@pytest.fixture
+def ran(pzd_here: Callable[..., CompletedProcess[str]], tmp_path: Path) -> Callable[..., CompletedProcess[str]]:
+    (tmp_path / "damper.yaml").write_text(TWO + QUICK, encoding="utf-8")
+    return lambda *arguments: pzd_here("changes", "damper.yaml", *arguments, cwd=tmp_path)
+
+
+def test_two_settings_of_one_config_give_the_json_of_the_contract_and_a_page_beside_it(
+    ran: Callable[..., CompletedProcess[str]], tmp_path: Path
+) -> None:
+    done = ran("--from", "new", "--to", "aged", "--json")
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    folder = tmp_path / "runs" / "damper" / "changes"
+    assert json.loads((folder / "new--aged.json").read_text(encoding="utf-8")) == printed
+    assert printed.keys() == KEYS
+    assert (printed["verdict"], printed["from"], printed["to"], printed["compared"]) == (
+        "changed", "new", "aged", "cycles",
+    )  # fmt: skip
+    (change,) = printed["changes"]
+    assert change.keys() == OF_CHANGE
+    assert (change["name"], change["parameter"], change["of"], change["unit"]) == ("T0", "T0", "damper", "N")
+    assert change["low95"] < 330.0 + (change["from"] - 300.0) < change["high95"]
+    assert printed["difference"].keys() == {"rms_N", "share_of_peak", "noise_N", "left_N", "explained"}
+    page = (folder / "new--aged.html").read_text(encoding="utf-8")
+    assert "What changed from new to aged" in page
+    assert "<script" not in page
+    # Again, the other way round: the files of both stand beside each other, the same bytes for the same states.
+    first = (folder / "new--aged.json").read_bytes()
+    assert ran("--from", "aged", "--to", "new").returncode == 0
+    assert {path.name for path in folder.glob("*.json")} == {"new--aged.json", "aged--new.json"} | {".written.json"}
+    assert ran("--from", "new", "--to", "aged").returncode == 0
+    assert (folder / "new--aged.json").read_bytes() == first
+
+
+def test_two_configs_are_two_states_and_the_files_stand_with_the_second(
+    pzd_here: Callable[..., CompletedProcess[str]], tmp_path: Path
+) -> None:
+    for name, friction in (("before", 300), ("after", 270)):
+        text = f"seed: {friction}\ncontrol: {{name: current, unit: A}}\nrig:\n  virtual:\n"
+        text += STATE.format(setting=name, friction=friction).replace("voltage_V", "current_A").replace(
+            "voltages_V", "currents_A"
+        )  # fmt: skip
+        (tmp_path / f"{name}.yaml").write_text(text + QUICK, encoding="utf-8")
+    done = pzd_here("changes", "before.yaml", "after.yaml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "from before to after: changed" in done.stdout
+    assert (tmp_path / "runs" / "after" / "changes" / "before--after.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "two states are needed: a second config, or two settings by --from and --to"),
+        (("--from", "new", "--to", "new"), "--from and --to name the same records"),
+        (("--from", "new", "--to", "agde"), "did you mean aged?"),
+        (("missing.yaml",), "missing.yaml: the file is missing"),
+    ],
+)
+def test_a_call_that_names_no_two_states_is_refused_with_what_to_do(
+    ran: Callable[..., CompletedProcess[str]], arguments: tuple[str, ...], says: str
+) -> None:
+    done = ran(*arguments)
+    assert done.returncode == 2
+    assert says in done.stderr
