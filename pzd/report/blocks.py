@@ -100,6 +100,8 @@ def sentence(text: str) -> str:
 
 WIDE = 36
 """Characters from which on the lines of a cell are broken."""
+MOST_BESIDE = 7
+"""Columns of a table that stands beside words; one with more takes the whole width."""
 
 
 @dataclass(frozen=True)
@@ -162,12 +164,46 @@ Block = Paragraph | Notes | TextTable | Gallery
 
 
 @dataclass(frozen=True)
+class SectionRow:
+    """Words, and the tables and pictures that they speak of beside them."""
+
+    words: tuple[Paragraph | Notes, ...]
+    shown: tuple[TextTable | Gallery, ...]
+
+    @property
+    def broad(self) -> bool:
+        """Whether a table needs the whole width, so that the words stand above."""
+        return any(isinstance(block, TextTable) and len(block.header) > MOST_BESIDE for block in self.shown)
+
+
+@dataclass(frozen=True)
 class Section:
     """One section of the page: a title and its blocks."""
 
     anchor: str
     title: str
     blocks: tuple[Block, ...]
+
+    @property
+    def rows(self) -> tuple[SectionRow, ...]:
+        """The blocks in their order, each run of words with what comes behind it."""
+        rows: list[SectionRow] = []
+        for block in self.blocks:
+            last = rows[-1] if rows else SectionRow((), ())
+            if isinstance(block, Paragraph | Notes):
+                joins = bool(rows) and not last.shown
+                row = SectionRow((*last.words, block), ()) if joins else SectionRow((block,), ())
+            else:
+                joins, row = bool(rows), SectionRow(last.words, _beside(last.shown, block))
+            rows[-1:] = [row] if joins else [*rows[-1:], row]
+        return tuple(rows)
+
+
+def _beside(shown: tuple[TextTable | Gallery, ...], block: TextTable | Gallery) -> tuple[TextTable | Gallery, ...]:
+    """Put a block behind others; pictures in a row go on in the same gallery, so that no row has a hole."""
+    if shown and isinstance(block, Gallery) and isinstance(shown[-1], Gallery):
+        return (*shown[:-1], Gallery(shown[-1].pictures + block.pictures))
+    return (*shown, block)
 
 
 @dataclass(frozen=True)
@@ -177,6 +213,14 @@ class Card:
     question: str
     answer: str
     detail: str
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What a page begins with: the answer in a sentence, and the pictures that show it."""
+
+    answer: str
+    pictures: tuple[Picture, ...] = ()
 
 
 # --- Rows of pictures ---

@@ -68,8 +68,6 @@ class Medium:
     """Between a number and its unit."""
     more_digits: int
     """Beside those of a column."""
-    units_in_head: bool
-    """Whether the head of a column has the unit, and not each cell."""
 
     def amount(self, value: float | None, unit: str = "", digits: int = 3) -> str:
         """Return a number with its unit; a dash where there is none."""
@@ -117,10 +115,8 @@ class Medium:
         return f"{value} ({low} to {high})"
 
 
-TERMINAL = Medium(
-    "-", lambda value, digits: f"{value:.{digits}g}", lambda unit: unit.removeprefix("-"), " ", 1, units_in_head=True
-)
-PAGE = Medium(blocks.DASH, blocks.number, blocks.unit_of, NO_BREAK, 0, units_in_head=False)
+TERMINAL = Medium("-", lambda value, digits: f"{value:.{digits}g}", lambda unit: unit.removeprefix("-"), " ", 1)
+PAGE = Medium(blocks.DASH, blocks.number, blocks.unit_of, NO_BREAK, 0)
 
 
 # --- Columns and tables ---
@@ -161,14 +157,12 @@ class Column:
             return self.words(cell)
         if self.decimals is not None and isinstance(cell, float):
             return f"{cell:.{self.decimals}f}"
-        unit = "" if medium.units_in_head or isinstance(cell, Estimate) else self.unit
-        return medium.text(cell, unit, self.digits, self.factor)
+        return medium.text(cell, "", self.digits, self.factor)
 
-    def heading(self, rows: Sequence[Any], medium: Medium) -> str:
-        """Return the head, with the unit where cells have none."""
+    def heading(self, medium: Medium) -> str:
+        """Return the head with the unit, which stands in no cell."""
         unit = medium.unit(self.unit)
-        in_head = medium.units_in_head or any(isinstance(self.of(row), Estimate) for row in rows)
-        return f"{self.head} [{unit}]" if unit and in_head and not self.words else self.head
+        return f"{self.head} [{unit}]" if unit and not self.words else self.head
 
 
 @dataclass(frozen=True)
@@ -199,7 +193,7 @@ class Table:
     def cells(self, medium: Medium) -> list[tuple[str, ...]]:
         """Return the heads and the rows as text, less optional columns without a value."""
         shown = [c for c in self.columns if not c.optional or any(c.of(row) not in (None, "") for row in self.rows)]
-        heads = tuple(column.heading(self.rows, medium) for column in shown)
+        heads = tuple(column.heading(medium) for column in shown)
         return [heads, *(tuple(column.text(row, medium) for column in shown) for row in self.rows)]
 
     def lines(self, indent: str = "") -> list[str]:
@@ -210,6 +204,11 @@ class Table:
         """Return the block for a page."""
         header, *rows = self.cells(PAGE)
         return TextTable(self.title, header, tuple(rows), folded=self.fold is not None and len(rows) > self.fold)
+
+    def across(self) -> TextTable:
+        """Return the block for a page with the rows side by side, the first column as head."""
+        header, *lines = zip(*self.cells(PAGE), strict=True)
+        return TextTable(self.title, header, tuple(lines), folded=self.fold is not None and len(self.rows) > self.fold)
 
     def records(self) -> list[dict[str, Any]]:
         """Return plain data, a mapping a row: numbers in SI, of an estimate three."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Place = Literal["characteristics", "model", "missing", "damper", "passenger", "policies"]
+Place = Literal["answer", "characteristics", "model", "missing", "damper", "passenger", "policies"]
 """Where on the page a plot stands."""
 
 MEASURED = "#4d4d4d"
@@ -37,6 +37,8 @@ BY_FIDELITY = {"ideal": "#56b4e9", "table": "#009e73", "dynamic": "#0072b2"}
 """Colours of controlled rides, of Okabe and Ito (2008), which people with any colour vision tell apart."""
 BY_POLICY = {"best_fixed_voltage": "#d55e00", "best_constant_c": "#cc79a7", "passive": "#4d4d4d", "constant": "#e69f00"}
 """Likewise, of the rides that a controlled one is compared with."""
+OTHER_POLICY = "#009e73"
+"""Of a policy that controls and is not the one under study."""
 MAP = "cividis"
 """Colour map that reads the same in grey and with any colour vision."""
 _MOST_POINTS = 700
@@ -96,11 +98,9 @@ class Plot:
 _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
 """Width of a letter of a tick label."""
-_LONGEST_LABEL = 28
-"""Letters of a tick label: half of the width stays for the axes."""
 _LEGEND_COLUMNS = 4
 _LONGEST_LABEL = 34
-"""Characters of a label of the vertical axis."""
+"""Characters of a label of the vertical axis: half of the width stays for the axes."""
 
 
 def axes(
@@ -198,7 +198,8 @@ def encoded(panel: Panel) -> Picture:
 
 def line_of(context: ReportContext, row: SummaryRow) -> tuple[str, bool]:
     """Return the colour of a ride, and whether it is controlled."""
-    return BY_POLICY.get(row.policy, BY_FIDELITY[row.fidelity]), context.simulate.is_controlled(row.policy)
+    controlled = context.simulate.is_controlled(row.policy)
+    return BY_POLICY.get(row.policy, BY_FIDELITY[row.fidelity] if controlled else OTHER_POLICY), controlled
 
 
 def thinned(*columns: Array) -> tuple[Array, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.artefacts import Finding, ForceRow, Gap, RecordEntry, Rig
+from pzd.artefacts import Finding, ForceRow, Gap, RecordEntry, Rig, SummaryRow
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -19,6 +20,7 @@ from pzd.report.blocks import (
     Card,
     Gallery,
     Notes,
+    Opening,
     Paragraph,
     Section,
     amount,
@@ -32,11 +34,12 @@ from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, encoded, pictures, styled
 from pzd.report.plots import library
-from pzd.report.ride_comfort import UNCONTROLLED, Comparison, RatedRides
+from pzd.report.ride_comfort import Comparison, RatedRides
 from pzd.report.sections import damper, missing, passenger, tested, trust
 from pzd.report.sections.missing import least_known, rig_test, verdict
 from pzd.report.sections.passenger import change
 from pzd.schema.errors import counted
+from pzd.simulate.policies import policies
 from pzd.simulate.study.plan import assumed
 
 if TYPE_CHECKING:
@@ -127,20 +130,68 @@ def _next(context: ReportContext) -> Card:
     return Card("Which test next?", _capital(rig_test(context, test)), sentence(least_known(context, test)) or why)
 
 
+_MOST_ROADS = 4
+"""Roads of the headline; the others stand in their section."""
+
+
 def _comfort(context: ReportContext) -> Card:
     rated = context.rated
     if not context.controlled:
         return Card("What does the passenger feel?", _comfort_levels(rated), "")
-    question = "What does control give the passenger?"
-    found = {road: compared[0] for road in rated.roads if (compared := rated.comparisons(road))}
-    if not found:
+    question = "Which policy rides best?"
+    if not any(policies()[ride.row.policy].controlled for ride in rated.rides):
         return Card(question, "Nothing controls the dampers", _comfort_levels(rated))
-    first = next(iter(found.values()))
-    against = first.others[0].policy
-    answer = "; ".join(f"{rated.road_label(road)}: a_w {_gain(rated, one)}" for road, one in found.items())
-    policy = _capital(spelled(first.controlled.policy))
-    beside = f"{policy} beside {_the(against)}, both {first.controlled.fidelity}"
-    return Card(question, answer, f"{beside}. {_price(rated, found)} {_gain_on_others(rated, found)}".strip())
+    best = {road: row for road in rated.roads[:_MOST_ROADS] if (row := rated.best(road)) is not None}
+    answer = "; ".join(f"{rated.road_label(road)}: {_best(rated, road, row)}" for road, row in best.items())
+    fidelity = listed(list(dict.fromkeys(row.fidelity for row in best.values())))
+    return Card(
+        question, _capital(answer), f"Fidelity {fidelity}. {_price(rated, best)} {_controlled(context)}".strip()
+    )
+
+
+def _best(rated: RatedRides, road: str, row: SummaryRow) -> str:
+    """Return the best policy on a road with a_w, beside the best that is held."""
+    held = rated.held(rated.by_comfort(road))
+    text = f"{rated.policy_label(row)}, a_w {amount(rated.a_w(row), 'm/s2')}"
+    if held is None or held is row:
+        return text
+    return f"{text}, {change(rated.a_w(held), rated.a_w(row))} than {_the(held.policy)}"
+
+
+def _price(rated: RatedRides, best: Mapping[str, SummaryRow]) -> str:
+    """Return what the best policy costs in wheel load and travel, beside the best that is held."""
+    parts = []
+    for road, row in best.items():
+        held = rated.held(rated.by_comfort(road))
+        if held is not None and held is not row:
+            load = change(held.rms_wheel_load_N, row.rms_wheel_load_N)
+            travel = change(held.peak_deflection_m, row.peak_deflection_m)
+            parts.append(f"{rated.road_label(road)}: wheel load {load}, travel {travel}")
+    return f"Its price: {'; '.join(parts)}." if parts else ""
+
+
+def _controlled(context: ReportContext) -> str:
+    """Return how the policy under study does where another one leads, and why a law that knows no lag falls behind."""
+    rated = context.rated
+    roads = [road for road in rated.roads[:_MOST_ROADS] if rated.comparisons(road)]
+    first = {road: rated.comparisons(road)[0] for road in roads}
+    behind = {road: one for road, one in first.items() if rated.best(road) is not one.controlled}
+    if not behind:
+        return ""
+    one = next(iter(behind.values()))
+    law = policies()[one.controlled.policy]
+    name = "The law of the paper (policy comfort)" if law.name == "comfort" else f"The policy {spelled(law.name)}"
+    changes = "; ".join(f"{rated.road_label(road)}: a_w {_gain(rated, each)}" for road, each in behind.items())
+    text = f"{name} beside {_the(one.others[0].policy)}, {one.controlled.fidelity}: {changes}."
+    if law.aim == "predict" or one.controlled.fidelity != "dynamic":
+        return text
+    at_once = [f"{rated.road_label(road)} {_gain(rated, each)}" for road in behind for each in _at_once(rated, road)]
+    without = f" Where the force follows at once (fidelity table) it is: {'; '.join(at_once)}." if at_once else ""
+    return f"{text} It knows neither the lag of the valve nor the oil spring.{without}"
+
+
+def _at_once(rated: RatedRides, road: str) -> list[Comparison]:
+    return [one for one in rated.comparisons(road) if one.controlled.fidelity == "table"]
 
 
 def _comfort_levels(rated: RatedRides) -> str:
@@ -152,38 +203,37 @@ def _comfort_levels(rated: RatedRides) -> str:
     return sentence(levels)
 
 
-def _gain(rated: RatedRides, one: Comparison, other: int = 0) -> str:
-    """Return the change of a_w by control, compared with one of the others."""
-    return change(rated.a_w(one.others[other]), rated.a_w(one.controlled))
-
-
-def _price(rated: RatedRides, found: Mapping[str, Comparison]) -> str:
-    """Return what control costs in wheel load and travel, compared with the same ride."""
-    parts = []
-    for road, one in found.items():
-        load = change(one.others[0].rms_wheel_load_N, one.controlled.rms_wheel_load_N)
-        travel = change(one.others[0].peak_deflection_m, one.controlled.peak_deflection_m)
-        parts.append(f"{rated.road_label(road)}: wheel load {load}, travel {travel}")
-    return f"Its price: {'; '.join(parts)}."
-
-
-def _gain_on_others(rated: RatedRides, found: Mapping[str, Comparison]) -> str:
-    """Return the change of a_w compared with each of the other rides at the same fidelity."""
-    texts = []
-    for policy in UNCONTROLLED:
-        gains = [
-            f"{rated.road_label(road)} {_gain(rated, one, place)}"
-            for road, one in found.items()
-            for place, other in enumerate(one.others)
-            if place > 0 and other.policy == policy
-        ]
-        if gains:
-            texts.append(f"Beside {_the(policy)} a_w is: {'; '.join(gains)}.")
-    return " ".join(texts)
+def _gain(rated: RatedRides, one: Comparison) -> str:
+    """Return the change of a_w by control, compared with the strongest of the others."""
+    return change(rated.a_w(one.others[0]), rated.a_w(one.controlled))
 
 
 def _the(policy: str) -> str:
     return {"passive": "the passive damper", "constant": "constant c"}.get(policy, f"the {spelled(policy)}")
+
+
+# --- The answer in a sentence ---
+
+
+def answer(context: ReportContext) -> str:
+    """Return what came out, as a person would say it."""
+    diagnosis, gap = context.diagnosed.diagnosis, context.diagnosed.diagnosis.gap
+    name = context.damper.baseline_name
+    names = [effect_in_words(effect).partition(":")[0] for effect in diagnosis.effects]
+    if diagnosis.verdict == "named":
+        sure = f" ({percent(diagnosis.confidence)} sure)" if diagnosis.confidence is not None else ""
+        text = f"The {name} lacks {listed(names)}{sure}"
+    elif diagnosis.verdict == "none":
+        text = f"The {name} describes this damper as well as these tests can tell"
+    else:
+        text = verdict(context).removesuffix(".")
+    if gap is None:
+        return f"{text}."
+    before, after, noise = (percent(math.sqrt(w)) for w in (gap.before, gap.after, gap.noise_floor))
+    on = "on tests that no fit has seen" if gap.hold_out == "records" else "on data that no fit has seen"
+    if not context.damper.extended or gap.after == gap.before:
+        return f"{text}: its error {on} is {before} of the force, and noise alone would leave {noise}."
+    return f"{text}: with it the error {on} falls from {before} to {after} of the force; noise alone leaves {noise}."
 
 
 # --- The page ---
@@ -209,8 +259,11 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         trust.render(context),
         trust.render_provenance(context),
     )
-    title = "Damper and comfort report" if context.ridden else "Damper report"
-    return render(": ".join(filter(None, (title, context.setting))), cards(context), _assumed(context), sections)
+    title = ": ".join(
+        filter(None, ("Damper and comfort report" if context.ridden else "Damper report", context.setting))
+    )
+    first = Opening(answer(context), tuple(picture for row in drawn["answer"] for picture in row))
+    return render(title, cards(context), _assumed(context), sections, opening=first)
 
 
 def _assumed(context: ReportContext) -> tuple[str, ...]:
@@ -230,14 +283,26 @@ def render(
     assumed: tuple[str, ...],
     sections: tuple[Section, ...],
     footer: str = _FOOTER,
+    opening: Opening | None = None,
 ) -> str:
-    """Fill the template of the report."""
+    """Fill the template of the report.
+
+    Parameters
+    ----------
+    title : of the page
+    headline : questions with their answers
+    assumed : what is assumed because nobody said otherwise
+    sections : of the page
+    footer : its last line
+    opening : what stands first, before the headline
+    """
     texts = {
         "title": title,
         "cards": headline,
         "assumed": assumed,
         "sections": sections,
         "footer": footer,
+        "opening": opening,
         "wide": WIDE,
     }
     return filled("pzd.report", "report.html", texts)

@@ -163,10 +163,15 @@ class RatedRides:
         return tuple(found)
 
     def most_realistic(self, road: str) -> tuple[SummaryRow, ...]:
-        """Return the rides over a road at the most realistic fidelity at which it was compared, or ridden at all."""
+        """Return the rides that are drawn, at the most realistic fidelity at which a road was compared, or ridden at all.
+
+        Where two are compared: the controlled one, those that do not control, and the most comfortable of all.
+        """
         compared = self.comparisons(road)
         if compared:
-            return (compared[0].controlled, *compared[0].others)
+            shown = (compared[0].controlled, *compared[0].others)
+            best = self.best(road)
+            return shown if best is None or best in shown or best.fidelity != shown[0].fidelity else (*shown, best)
         best = min((REALISTIC.index(row.fidelity) for row in self.over(road)), default=0)
         return tuple(row for row in self.over(road) if row.fidelity == REALISTIC[best])
 
@@ -180,6 +185,22 @@ class RatedRides:
             if sum(policies()[row.policy].controlled for row in rows) >= _FEWEST_CONTROLLED:
                 return tuple(sorted(rows, key=self.a_w))
         return ()
+
+    def by_comfort(self, road: str) -> tuple[SummaryRow, ...]:
+        """Return the rides over a road at the most realistic fidelity that was ridden, the most comfortable first."""
+        rows = self.over(road)
+        nearest = min((REALISTIC.index(row.fidelity) for row in rows), default=0)
+        return tuple(sorted((row for row in rows if row.fidelity == REALISTIC[nearest]), key=self.a_w))
+
+    def best(self, road: str) -> SummaryRow | None:
+        """Return the most comfortable of `by_comfort`; a schedule that was searched for is no policy to drive with."""
+        rows = self.by_comfort(road)
+        return next((row for row in rows if policies()[row.policy].tuned != "schedule"), None)
+
+    def held(self, rows: Sequence[SummaryRow]) -> SummaryRow | None:
+        """Return the strongest of the rides that do not control, in the order of `UNCONTROLLED`."""
+        by_policy = {row.policy: row for row in rows}
+        return next((by_policy[policy] for policy in UNCONTROLLED if policy in by_policy), None)
 
     def pareto_front(self, rows: Sequence[SummaryRow]) -> tuple[SummaryRow, ...]:
         """Return the rides than which none has both a lower a_w and a lower wheel load, in the order given."""
@@ -198,10 +219,14 @@ class RatedRides:
                 return f"{amount(road.frequency_Hz, 'Hz')} sine"
         return name
 
+    def policy_name(self, row: SummaryRow) -> str:
+        """Return the policy of a ride in words."""
+        return spelled(row.policy).removesuffix(" c")
+
     def policy_label(self, row: SummaryRow) -> str:
         """Return the policy of a ride in words, with what it held constant."""
         ridden = self._by_case[row.case].ridden
-        name = spelled(row.policy).removesuffix(" c")
+        name = self.policy_name(row)
         if ridden.damping_Ns_per_m is not None:
             return f"{name} c = {amount(ridden.damping_Ns_per_m, 'N s/m', 3)}"
         return name if ridden.voltage_V is None else f"{name} {amount(ridden.voltage_V, self.control.unit)}"

@@ -91,39 +91,45 @@ _BAND_SHADES = ("#f3f6f9", "#e6ecf2", "#d9e2ea", "#ccd7e2", "#bfccd9", "#b2c1d0"
 
 
 def comfort_scale(context: ReportContext) -> Iterator[Panel]:
-    """Draw a_w of every ride over the bands of likely reactions, which overlap as they do in the standard."""
+    """Draw a_w of every policy over the bands of likely reactions, which overlap as they do in the standard."""
     for road in context.rated.roads:
-        values = [(row, context.rated.value(row.case, "a_w")) for row in context.rated.over(road)]
+        values = [(row, context.rated.value(row.case, "a_w")) for row in context.rated.by_comfort(road)]
         known = [(row, value) for row, value in values if value is not None]
         if known:
             yield _scale_panel(context, road, known[::-1])
 
 
 def _scale_panel(context: ReportContext, road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
-    names = [f"{spelled(row.policy)}, {row.fidelity}" for row, _ in known]
-    figure, ax = axes("a_w [m/s²]", height=max(1.5 + 0.25 * len(known), _SCALE_HEIGHT_IN), labels=names, key=0)
+    names = [context.rated.policy_name(row) for row, _ in known]
+    height = max(1.0 + 0.22 * (len(known) + len(iso2631_1997.REACTIONS)), _SCALE_HEIGHT_IN)
+    figure, ax = axes("a_w [m/s²]", height=height, labels=names, key=0)
     right = max(2.6, 1.15 * max(value for _, value in known))
     _reaction_bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
         colour, controlled = line_of(context, row)
         ax.plot(value, place, "s" if controlled else "o", color=colour, markersize=6.0, zorder=3)
     ticks_named(ax, names)
-    ax.set_ylim(-0.6, len(known) + 2.6)
+    ax.set_ylim(-0.6, len(known) + len(iso2631_1997.REACTIONS) - 0.2)
     ax.set_xlim(0.0, right)
     ax.grid(visible=False, axis="y")
     label = context.rated.road_label(road)
     values = "; ".join(f"{context.rated.label(row)}: {number(value)} m/s²" for row, value in known[::-1])
     alt = f"Weighted r.m.s. a_w on {label}: {values}."
-    return Panel(figure, f"How it is likely to be felt, {label}", alt, "Bands overlap; the last two are not verified.")
+    caption = f"Fidelity {known[0][0].fidelity}. Bands overlap; the last two are not verified."
+    return Panel(figure, f"How it is likely to be felt, {label}", alt, caption)
 
 
-def _reaction_bands(ax: Axes, top: int, right: float) -> None:
-    for i, (band, shade) in enumerate(zip(iso2631_1997.REACTIONS, _BAND_SHADES, strict=True)):
-        height = top - 0.1 + 0.85 * (2 - i % 3)  # three rows in turn, so that overlapping bands stay apart
-        end = float(np.minimum(band.high, right))
+def _reaction_bands(ax: Axes, bottom: int, right: float) -> None:
+    """Draw a row a band above the rides, its name within or beside it where it has room."""
+    for place, (band, shade) in enumerate(zip(iso2631_1997.REACTIONS, _BAND_SHADES, strict=True)):
+        height, end = bottom + 0.2 + place, float(np.minimum(band.high, right))
+        if band.low >= right:
+            continue
         ax.barh(height, end - band.low, left=band.low, height=0.8, color=shade, edgecolor=AXIS, linewidth=0.5)
+        to_left = band.low > 0.5 * right
+        side = {"xytext": (-3 if to_left else 3, 0), "ha": "right" if to_left else "left"}
         name = band.text.replace(" uncomfortable", "")
-        ax.annotate(name, (band.low, height), (2, 0), textcoords="offset points", va="center", fontsize=7.0)
+        ax.annotate(name, (band.low, height), textcoords="offset points", va="center", fontsize=8.0, **side)
 
 
 # --- Chart of reduced comfort (ISO 2631:1978) ---
@@ -194,11 +200,23 @@ def trade_off(context: ReportContext) -> Iterator[Panel]:
     for road in context.rated.roads:
         rows = context.rated.trade_off(road)
         if rows:
-            yield _trade_off_panel(context, road, rows)
+            yield trade_off_panel(context, road, rows)
 
 
-def _trade_off_panel(context: ReportContext, road: str, rows: Sequence[SummaryRow]) -> Panel:
-    height = max(_AROUND_IN + _LINE_IN * len(rows), _LEAST_IN)
+def trade_off_panel(
+    context: ReportContext, road: str, rows: Sequence[SummaryRow], least_height: float = _LEAST_IN
+) -> Panel:
+    """Draw rides over one road, the best of them in a circle.
+
+    Parameters
+    ----------
+    context : the run
+    road : its name
+    rows : the rides at one fidelity, the most comfortable first
+    least_height : of the figure [in]
+    """
+    height = max(_AROUND_IN + _LINE_IN * len(rows), least_height)
+    best = context.rated.best(road)
     names = "wheel load, r.m.s. [N]", "a_w [m/s²]"
     figure, ax = axes(*names, height=height, labels=("0.00",), key=0, right=_NAMES_IN)
     loads = np.array([row.rms_wheel_load_N for row in rows])
@@ -207,17 +225,23 @@ def _trade_off_panel(context: ReportContext, road: str, rows: Sequence[SummaryRo
     for row, load, a_w in zip(rows, loads, comfort, strict=True):
         colour, mark = _trade_off_style(context, row)
         ax.plot(load, a_w, mark, color=colour, markersize=6.5 if row in front else 4.5, zorder=3)
+        if row == best:
+            ax.plot(load, a_w, "o", color=INK, markersize=14.0, fillstyle="none", markeredgewidth=1.2, zorder=2)
     edge = sorted((load, a_w) for row, load, a_w in zip(rows, loads, comfort, strict=True) if row in front)
     ax.step(*zip(*edge, strict=True), where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
-    ax.margins(0.06)
-    _write_names(ax, context, rows, loads, comfort)
+    ax.margins(0.09)
+    _write_names(ax, context, rows, best)
     values = "; ".join(
         f"{spelled(row.policy)} {amount(a_w, 'm/s2')} and {amount(load, 'N')}"
         for row, load, a_w in zip(rows, loads, comfort, strict=True)
     )
     title = f"Comfort against wheel load, {context.rated.road_label(road)}"
     alt = f"a_w and r.m.s. wheel load on {context.rated.road_label(road)}: {values}."
-    return Panel(figure, title, alt, f"Fidelity {rows[0].fidelity}.")
+    of = f"Of {len(rows)} policies {context.rated.policy_name(best)} is the most comfortable (circle). " if best else ""
+    caption = (
+        f"{of}To the left the road feels less of the car, below the passenger less of the road ({rows[0].fidelity})."
+    )
+    return Panel(figure, title, alt, caption)
 
 
 def _trade_off_style(context: ReportContext, row: SummaryRow) -> tuple[str, str]:
@@ -229,20 +253,21 @@ def _trade_off_style(context: ReportContext, row: SummaryRow) -> tuple[str, str]
     return (BASELINE, "^") if policies()[row.policy].controlled else (MEASURED, "o")
 
 
-def _write_names(ax: Axes, context: ReportContext, rows: Sequence[SummaryRow], loads: Array, comfort: Array) -> None:
+def _write_names(ax: Axes, context: ReportContext, rows: Sequence[SummaryRow], best: SummaryRow | None) -> None:
     """Write every name beside the axes, in the order of comfort, with a line to its point."""
     low, high = ax.get_ylim()
     places = np.linspace(0.0, 1.0, len(rows)) if len(rows) > 1 else np.array([0.5])
-    for row, load, a_w, place in zip(rows, loads, comfort, places, strict=True):
+    for row, place in zip(rows, places, strict=True):
         colour, _ = _trade_off_style(context, row)
         ax.annotate(
             spelled(row.policy),
-            (load, a_w),
+            (row.rms_wheel_load_N, context.rated.a_w(row)),
             (1.06, place),
             textcoords="axes fraction",
             va="center",
             fontsize=8.0,
             color=colour,
+            weight="bold" if row == best else "normal",
             annotation_clip=False,
             arrowprops=_LEADER,
         )

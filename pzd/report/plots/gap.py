@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.record import Array, Record
-from pzd.report.blocks import number
+from pzd.report.blocks import number, spelled
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend, shortened
 from pzd.report.rig_tests import settled
@@ -169,14 +169,14 @@ def ranking(context: ReportContext) -> Iterator[Panel]:
     ranked = diagnosis.ranking[:_MOST_CANDIDATES][::-1]
     if not ranked:
         return
-    names, height = [r.effect for r in ranked], 1.0 + 0.26 * max(len(ranked), 3)
+    names, height = [spelled(r.effect) for r in ranked], 1.0 + 0.26 * max(len(ranked), 3)
     figure, ax = axes("W_s left on the tests seen [-]", height=height, labels=names)
     colours = [FINAL if r.effect in diagnosis.effects else MUTED for r in ranked]
     ax.barh(names, [r.gap_after for r in ranked], color=colours, height=0.62)
     ax.locator_params(axis="x", nbins=4)
     ax.grid(visible=False, axis="y")
     ax.grid(color=GRID, axis="x")
-    alt = f"What each candidate leaves of the gap; best: {ranked[-1].effect}, W_s {ranked[-1].gap_after:.3g}."
+    alt = f"What each candidate leaves of the gap; best: {names[-1]}, W_s {ranked[-1].gap_after:.3g}."
     caption = "Best first by what the noise makes likely. Adopted effects stand out in dark blue."
     yield Panel(figure, "What each candidate leaves of the gap", alt, caption)
 

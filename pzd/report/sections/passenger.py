@@ -47,19 +47,17 @@ _UNCONTROLLED_FIDELITIES = {
 COMFORT_TIME = "exposure_time_reduced_comfort"
 _SAME = 0.0005
 """A change of a smaller share is none."""
-_WEIGHTED = (("a_w", "m/s2"), ("MTVV", "m/s2"), ("VDV", "m/s^1.75"), ("crest_factor", "-"))
-"""Weighted measures of a ride, with their units."""
+_WEIGHTED = (("MTVV", "m/s2"), ("VDV", "m/s^1.75"), ("crest_factor", "-"))
+"""Weighted measures of a ride beside a_w, with their units."""
 
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """Return the section on the rides."""
     blocks: list[Block] = [Paragraph(_ride(context)), *_meanings(context, _all(context))]
-    blocks += _compared(context)
     blocks += by_turns(pictures["passenger"])
     blocks += _trade_off_blocks(context, pictures)
-    blocks += [_accelerations(context), _suspension(context), _wheels(context), _modes(context)]
-    blocks += [*_exposures(context), *_daily(context)]
-    blocks += _worth(context)
+    blocks += _rides(context)
+    blocks += [_modes(context)]
     beyond = tuple(_beyond(context))
     if beyond:
         blocks += [
@@ -110,7 +108,9 @@ def _meanings(context: ReportContext, rows: Sequence[SummaryRow]) -> tuple[Notes
     """Return what the names of the policies and fidelities of some rides stand for."""
     used = {row.policy for row in rows}
     as_it_is = {} if context.controlled else {"passive": "the damper as it is"}
-    names = [f"{name}: {as_it_is.get(name, policy.meaning)}" for name, policy in policies().items() if name in used]
+    names = [
+        f"{spelled(name)}: {as_it_is.get(name, policy.meaning)}" for name, policy in policies().items() if name in used
+    ]
     exact = {row.fidelity for row in rows}
     fidelities = _FIDELITIES if context.controlled else _UNCONTROLLED_FIDELITIES
     names += [f"{name}: {text}" for name, text in fidelities.items() if name in exact]
@@ -154,41 +154,7 @@ def _supply(context: ReportContext) -> Iterator[str]:
         yield f"supply of an axle, at table and dynamic: {listed(limits)}"
 
 
-# --- The controlled policy beside every other at the same fidelity ---
-
-
-def _compared(context: ReportContext) -> Iterator[Block]:
-    pairs = [
-        (one.controlled, other)
-        for road in context.rated.roads
-        for one in context.rated.comparisons(road)
-        for other in one.others
-    ]
-    if not pairs:
-        return
-    policy = pairs[0][0].policy
-    yield Paragraph(
-        f"The policy {policy} is compared with the others on the same road and at the same fidelity. What the "
-        "best of the others hold constant was searched for on each road and at each fidelity, for the least a_w."
-    )
-
-    def changed(name: str, head: str, value: Callable[[SummaryRow], float]) -> Column:
-        return Column(name, head, value=lambda pair: change(value(pair[1]), value(pair[0])))
-
-    yield Table(
-        f"The policy {policy} compared with the others at the same fidelity (a_w: ISO 2631-1:1997)",
-        (
-            Column("road", "road", value=lambda pair: pair[0].road),
-            Column("fidelity", "fidelity", value=lambda pair: pair[0].fidelity),
-            Column("beside", "compared with", value=lambda pair: context.rated.policy_label(pair[1])),
-            Column("a_w", f"a_w {policy}", "m/s2", lambda pair: context.rated.a_w(pair[0])),
-            Column("a_w_other", "a_w of the other", "m/s2", lambda pair: context.rated.a_w(pair[1])),
-            changed("a_w_change", "change of a_w", context.rated.a_w),
-            changed("load_change", "of wheel load", lambda row: row.rms_wheel_load_N),
-            changed("travel_change", "of travel", lambda row: row.peak_deflection_m),
-        ),
-        pairs,
-    ).block()
+# --- Changes in words ---
 
 
 def change(before: float, after: float) -> str:
@@ -226,7 +192,6 @@ def _trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Bl
         )
         yield Notes(found)
     yield from galleries(pictures["policies"])
-    yield _all_policies(context, tuple(shown))
 
 
 def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...]) -> str:
@@ -247,114 +212,143 @@ def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...])
     return f"{best_ride}; {spelled(mine.policy)} goes {percent(way)} of the way to it from the best fixed voltage"
 
 
-def _all_policies(context: ReportContext, roads: tuple[str, ...]) -> TextTable:
-    ridden = {row.fidelity for road in roads for row in context.rated.over(road)}
-    fidelities = [name for name in reversed(REALISTIC) if name in ridden]
-    found: dict[tuple[str, str], dict[str, SummaryRow]] = {}
-    for road in roads:
-        for row in context.rated.over(road):
-            found.setdefault((road, row.policy), {})[row.fidelity] = row
-
-    def at(fidelity: str, name: str, unit: str, value: Callable[[SummaryRow], float]) -> Column:
-        def cell(item: tuple[Any, dict[str, SummaryRow]]) -> Cell:
-            return value(item[1][fidelity]) if fidelity in item[1] else None
-
-        return Column(f"{name}_{fidelity}", f"{name}, {fidelity}", unit, cell)
-
-    return Table(
-        "Comfort and r.m.s. wheel load of every policy, by fidelity",
-        (
-            Column("road", "road", value=lambda item: item[0][0]),
-            Column("policy", "policy", value=lambda item: spelled(item[0][1])),
-            *(at(fidelity, "a_w", "m/s2", context.rated.a_w) for fidelity in fidelities),
-            *(at(fidelity, "load", "N", lambda row: row.rms_wheel_load_N) for fidelity in fidelities),
-        ),
-        list(found.items()),
-        fold=0,
-    ).block()
+# --- The rides: a table a road and fidelity, the policies side by side ---
 
 
-# --- Tables of all rides ---
+def _rides(context: ReportContext) -> Iterator[Block]:
+    """Yield the rides road by road, those at the most realistic fidelity open and the others folded."""
+    shown = [
+        (road, fidelity, tuple(row for row in context.rated.over(road) if row.fidelity == fidelity))
+        for road in context.rated.roads
+        for fidelity in REALISTIC
+    ]
+    rows_at = {(road, fidelity): rows for road, fidelity, rows in shown if rows}
+    if not rows_at:
+        return
+    yield Paragraph(_how_rated(context))
+    opened = {road: min(REALISTIC.index(each) for of, each in rows_at if of == road) for road, _ in rows_at}
+    for (road, fidelity), rows in rows_at.items():
+        title = f"{context.rated.road_label(road)}, {fidelity}"
+        fold = None if REALISTIC[opened[road]] == fidelity else 0
+        columns = (Column("policy", "policy", value=context.rated.policy_label), *_measures(context, rows))
+        yield Table(title, columns, rows, fold).across()
 
 
-def _by_ride(context: ReportContext, of: Callable[[Any], SummaryRow] = lambda row: row) -> tuple[Column, Column]:
-    """Return the columns that tell rides apart: the road, and what drove the dampers."""
-    return (
-        Column("road", "road", value=lambda row: of(row).road),
-        Column("dampers", "dampers", value=lambda row: context.rated.label(of(row))),
-    )
+def _how_rated(context: ReportContext) -> str:
+    """Return by what the rides are rated, and what of a table needs a word."""
+    texts = []
+    if iso2631_1997.EDITION in context.config.editions:
+        texts.append(f"a_w, MTVV, VDV and crest factor are weighted by Wk ({iso2631_1997.EDITION}).")
+    if iso2631_1978.EDITION in context.config.editions:
+        texts.append(
+            f"Exposure times: {iso2631_1978.EDITION}, {iso2631_1978.TRUST}; comfort.csv says what governs them."
+        )
+    if directive.EDITION in context.config.editions:
+        hours = number(context.config.daily_exposure_h)
+        texts.append(f"A(8) and what follows: {directive.EDITION}, {hours} h a day, vertical direction only.")
+    if any(context.rated.on_baseline(row) for row in _all(context)):
+        texts.append("Without the missing effect: the same rides on the damper before diagnose.")
+    if context.rides.wheels:
+        mass = context.simulate.car.car().wheels_have_mass
+        made = "of the tyre" if mass else "the static load less the force of spring and damper"
+        first = context.rides.wheels[0].case
+        at_rest = [amount(wheel.static_load_N, "N") for wheel in context.rides.wheels if wheel.case == first]
+        texts.append(f"Force between wheel and road: {made}, at rest {listed(at_rest)}.")
+    searched = "What the best fixed voltage and the best constant c hold was searched for on each road and fidelity."
+    return " ".join([*texts, *([searched] if any(row.policy.startswith("best_") for row in _all(context)) else [])])
 
 
-def _of_rides(context: ReportContext, title: str, *columns: Column) -> TextTable:
-    """Return a table of all rides."""
-    return Table(title, (*_by_ride(context), *columns), _all(context)).block()
+def _measures(context: ReportContext, rows: Sequence[SummaryRow]) -> Iterator[Column]:
+    """Yield the measures of rides at one fidelity over one road, a line each; those that no ride has stay away."""
+    editions = context.config.editions
+    if iso2631_1997.EDITION in editions:
+        yield from _weighted(context, rows)
+    yield Column("peak_abs_aK_m_per_s2", "peak |a_K|", "m/s2")
+    yield Column("rms_aK_m_per_s2", "r.m.s. a_K", "m/s2")
+    yield Column("rms_wheel_load_N", "wheel load, r.m.s.", "N")
+    yield from _changed(context, rows, "wheel load", lambda row: row.rms_wheel_load_N)
+    yield Column("peak_deflection_m", "travel", "mm", factor=1000.0)
+    yield from _changed(context, rows, "travel", lambda row: row.peak_deflection_m)
+    yield Column("rms_jerk_m_per_s3", "jerk, r.m.s.", "m/s3")
+    yield Column("dissipated_J", "dissipated", "J")
+    yield from _of_wheels(context)
+    if iso2631_1978.EDITION in editions:
+        for boundary in iso2631_1978.FACTORS:
+            yield _measure(context, f"exposure_time_{boundary}", f"{boundary.replace('_', ' ')} after", "min", minutes)
+        yield _without(context, COMFORT_TIME, "reduced comfort after", "min", minutes)
+    if directive.EDITION in editions:
+        yield _measure(context, "A(8)", "A(8)", "m/s2")
+        yield _measure(context, "VDV_day", "VDV of the day", "m/s^1.75")
+        yield _measure(context, "time_to_action_value", "action value after", "h")
+        yield _measure(context, "time_to_limit_value", "limit value after", "h")
+
+
+def _weighted(context: ReportContext, rows: Sequence[SummaryRow]) -> Iterator[Column]:
+    yield _measure(context, "a_w", "a_w", "m/s2")
+    yield from _changed(context, rows, "a_w", context.rated.a_w)
+    yield _without(context, "a_w", "a_w", "m/s2")
+    yield Column("reaction", "likely to be felt as", value=lambda row: _reaction(context.rated.a_w(row)))
+    for name, unit in _WEIGHTED:
+        yield _measure(context, name, name.replace("_", " ") if unit == "-" else name, unit)
 
 
 def _measure(
     context: ReportContext, measure: str, head: str, unit: str, words: Callable[[Any], str] | None = None
 ) -> Column:
-    """Return the column of a comfort measure."""
+    """Return a comfort measure of the rides."""
     return Column(measure, head, unit, lambda row: context.rated.value(row.case, measure), words=words)
 
 
-def _accelerations(context: ReportContext) -> TextTable:
-    def reaction(row: SummaryRow) -> str | None:
-        a_w = context.rated.value(row.case, "a_w")
-        return None if a_w is None else " to ".join(reaction.text for reaction in iso2631_1997.reactions(a_w))
+def _without(
+    context: ReportContext, measure: str, head: str, unit: str, words: Callable[[Any], str] | None = None
+) -> Column:
+    """Return a comfort measure of the same rides on the damper before diagnose; left out where there are none."""
 
-    return _of_rides(
-        context,
-        "Acceleration at K (a_w, MTVV, VDV and crest factor weighted by Wk, ISO 2631-1:1997)",
-        Column("peak_abs_aK_m_per_s2", "peak |a_K|", "m/s2"),
-        Column("rms_aK_m_per_s2", "r.m.s.", "m/s2"),
-        *(_measure(context, name, name.replace("_", " ") if unit == "-" else name, unit) for name, unit in _WEIGHTED),
-        Column("reaction", "likely to be felt as", value=reaction),
-    )
+    def value(row: SummaryRow) -> Cell:
+        other = context.rated.on_baseline(row)
+        return None if other is None else context.rated.value(other.case, measure)
+
+    return Column(f"{measure}_without", f"without the missing effect: {head}", unit, value, optional=True, words=words)
 
 
-def _suspension(context: ReportContext) -> TextTable:
-    return _of_rides(
-        context,
-        "What comfort costs: travel and wheel load",
-        Column("peak_deflection_m", "deflection", "mm", factor=1000.0),
-        Column("rms_wheel_load_N", "wheel load, r.m.s.", "N"),
-        Column("rms_jerk_m_per_s3", "jerk, r.m.s.", "m/s3"),
-        Column("dissipated_J", "dissipated", "J"),
-    )
+def _changed(
+    context: ReportContext, rows: Sequence[SummaryRow], head: str, of: Callable[[SummaryRow], float]
+) -> Iterator[Column]:
+    """Yield the change of a measure beside the strongest of the policies that do not control, where one was ridden."""
+    reference = context.rated.held(rows)
+    if reference is not None and len(rows) > 1:
+        name = context.rated.policy_name(reference)
+
+        def value(row: SummaryRow) -> Cell:
+            return None if row is reference else change(of(reference), of(row))
+
+        yield Column(f"{head}_change", f"{head} beside {name}", value=value)
 
 
-def _wheels(context: ReportContext) -> TextTable:
-    """Return the contact forces, axles side by side; the load at rest stands in the caption."""
-    by_case: dict[str, list[WheelRow]] = {}
+def _reaction(a_w: float) -> str:
+    return " to ".join(reaction.text for reaction in iso2631_1997.reactions(a_w))
+
+
+def _of_wheels(context: ReportContext) -> Iterator[Column]:
+    """Yield the least force between wheel and road of each axle, and how long none is left."""
+    by_case: dict[str, dict[int, WheelRow]] = {}
     for wheel in context.rides.wheels:
-        by_case.setdefault(wheel.case, []).append(wheel)
-    rows = [(row, by_case[row.case]) for row in _all(context) if row.case in by_case]
-    axles = rows[0][1] if rows else []
+        by_case.setdefault(wheel.case, {})[wheel.axle] = wheel
     mass = context.simulate.car.car().wheels_have_mass
-    without = "off the road" if mass else "pulling"
-    made = "the force of the tyre" if mass else "the static load less the force of spring and damper"
-    share = "share of the time at 0" if mass else "share of the time at 0 or below"
-    at_rest = listed([amount(wheel.static_load_N, "N") for wheel in axles])
-    at = f" (at rest {at_rest}; {without}: {share})" if axles else ""
+    without = "off the road (at 0)" if mass else "pulling on the road (at 0 or below)"
 
-    def of_axle(place: int, name: str) -> Callable[[tuple[SummaryRow, list[WheelRow]]], Cell]:
-        return lambda pair: float(getattr(pair[1][place], name))
+    def of_axle(axle: int, name: str) -> Callable[[SummaryRow], Cell]:
+        def cell(row: SummaryRow) -> Cell:
+            wheel = by_case.get(row.case, {}).get(axle)
+            return None if wheel is None else float(getattr(wheel, name))
 
-    return Table(
-        f"Force between wheel and road: {made}{at}",
-        (
-            *_by_ride(context, lambda pair: pair[0]),
-            *(
-                Column(f"min_{n}_N", f"least force, axle {wheel.axle}", "N", of_axle(n, "min_contact_force_N"))
-                for n, wheel in enumerate(axles)
-            ),
-            *(
-                tables.share(f"pulling_{n}", f"{without}, axle {wheel.axle}", of_axle(n, "pulling"))
-                for n, wheel in enumerate(axles)
-            ),
-        ),
-        rows,
-    ).block()
+        return cell
+
+    for axle in sorted({wheel.axle for wheel in context.rides.wheels}):
+        yield Column(
+            f"min_{axle}_N", f"least force on the road, axle {axle}", "N", of_axle(axle, "min_contact_force_N")
+        )
+        yield tables.share(f"pulling_{axle}", f"{without}, axle {axle}", of_axle(axle, "pulling"))
 
 
 def _modes(context: ReportContext) -> TextTable:
@@ -368,63 +362,6 @@ def _modes(context: ReportContext) -> TextTable:
             Column("damping_ratio", "damping ratio"),
         ),
         modes(context.simulate.car.car(), c),
-    ).block()
-
-
-def _exposures(context: ReportContext) -> Iterator[TextTable]:
-    if iso2631_1978.EDITION not in context.config.editions:
-        return
-
-    def status(row: SummaryRow) -> str:
-        found = context.rated.measures.get((row.case, COMFORT_TIME))
-        return "" if found is None else found.status.removeprefix(f"{iso2631_1978.TRUST}; ")
-
-    yield _of_rides(
-        context,
-        f"Exposure times ({iso2631_1978.EDITION}, {iso2631_1978.TRUST})",
-        *(
-            _measure(context, f"exposure_time_{boundary}", boundary.replace("_", " "), "min", minutes)
-            for boundary in iso2631_1978.FACTORS
-        ),
-        Column("status", "how (reduced comfort)", value=status),
-    )
-
-
-def _daily(context: ReportContext) -> Iterator[TextTable]:
-    if directive.EDITION not in context.config.editions:
-        return
-    yield _of_rides(
-        context,
-        f"{directive.EDITION}, {number(context.config.daily_exposure_h)} h a day, vertical direction only",
-        _measure(context, "A(8)", "A(8)", "m/s2"),
-        _measure(context, "VDV_day", "VDV of the day", "m/s^1.75"),
-        _measure(context, "time_to_action_value", "action value after", "h"),
-        _measure(context, "time_to_limit_value", "limit value after", "h"),
-    )
-
-
-def _worth(context: ReportContext) -> Iterator[Block]:
-    """Yield the rides with and without the missing effect; nothing where no effect was adopted."""
-    pairs = [(other, row) for row in _all(context) if (other := context.rated.on_baseline(row)) is not None]
-    if not pairs:
-        return
-
-    def both(name: str, unit: str, value: Callable[[SummaryRow], Cell], **more: Any) -> tuple[Column, Column]:
-        return (
-            Column(f"{name}_without", f"{name} without", unit, lambda pair: value(pair[0]), **more),
-            Column(f"{name}_with", f"{name} with", unit, lambda pair: value(pair[1]), **more),
-        )
-
-    yield Paragraph("The same rides on the damper before anything was added to it: what the missing effect is worth.")
-    yield Table(
-        "With and without the missing effect (time: reduced comfort)",
-        (
-            *_by_ride(context, lambda pair: pair[1]),
-            *both("peak", "m/s2", lambda row: row.peak_abs_aK_m_per_s2),
-            *both("a_w", "m/s2", lambda row: context.rated.value(row.case, "a_w")),
-            *both("time", "min", lambda row: context.rated.value(row.case, COMFORT_TIME), words=minutes),
-        ),
-        pairs,
     ).block()
 
 

@@ -104,8 +104,8 @@ def _carried(damper: Damper, before: float, after: float, forces: tuple[float, f
     if share < _NOTED:
         return ""
     return (
-        f"{min(share, 1.0):.0%} of the step come with the stiffness of the oil spring, k from {rows[before]:.3g} to "
-        f"{rows[after]:.3g} N/m, which follows the valve: a loaded spring changes its force before the oil has flowed"
+        f"{100.0 * min(share, 1.0):.0f} % of the step comes before the oil has flowed: k goes with the valve from "
+        f"{rows[before] / 1000.0:.3g} to {rows[after] / 1000.0:.3g} kN/m, and a loaded oil spring changes its force at once"
     )
 
 
