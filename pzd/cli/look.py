@@ -187,7 +187,7 @@ def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     compared = [column for column in parameters.columns if column.name in ("T0_N", "C_Ns_per_m", "k_N_per_m", "W_s")]
     for row in run.parameters:
         for column in compared:
-            head = column.heading(run.parameters, TERMINAL)
+            head = column.heading(TERMINAL)
             yield f"{head}, {row.words(run.control) or 'all records'}", column.text(row, TERMINAL)
     if run.diagnosis is not None:
         yield "verdict", run.diagnosis.verdict

@@ -163,7 +163,7 @@ class RatedRides:
         return tuple(found)
 
     def most_realistic(self, road: str) -> tuple[SummaryRow, ...]:
-        """Return the rides that are drawn, at the most realistic fidelity at which a road was compared, or ridden at all.
+        """Return the rides that are drawn: at the most realistic fidelity compared on a road, or ridden at all.
 
         Where two are compared: the controlled one, those that do not control, and the most comfortable of all.
         """
@@ -172,8 +172,8 @@ class RatedRides:
             shown = (compared[0].controlled, *compared[0].others)
             best = self.best(road)
             return shown if best is None or best in shown or best.fidelity != shown[0].fidelity else (*shown, best)
-        best = min((REALISTIC.index(row.fidelity) for row in self.over(road)), default=0)
-        return tuple(row for row in self.over(road) if row.fidelity == REALISTIC[best])
+        nearest = min((REALISTIC.index(row.fidelity) for row in self.over(road)), default=0)
+        return tuple(row for row in self.over(road) if row.fidelity == REALISTIC[nearest])
 
     def trade_off(self, road: str) -> tuple[SummaryRow, ...]:
         """Return the rides of all policies over a road, the most comfortable first.

@@ -24,7 +24,7 @@ COLUMNS = (
 )
 
 
-def test_a_terminal_has_units_in_the_head_and_a_page_behind_each_number() -> None:
+def test_units_stand_in_the_head_in_a_terminal_and_on_a_page() -> None:
     table = Table("Tests", COLUMNS, ROWS, fold=1)
     assert table.lines("  ") == [
         "  test  stroke [mm]  force [N]   outside [%]",
@@ -32,10 +32,20 @@ def test_a_terminal_has_units_in_the_head_and_a_page_behind_each_number() -> Non
         "  b     -            (7)         0",
     ]
     block = table.block()
-    assert block.header == ("test", "stroke", "force", "outside")
-    assert block.rows[0] == ("a", "12.3\xa0mm", "\u22121\u202f230 to 5\xa0N", "25\xa0%")
-    assert block.rows[1] == ("b", "\u2013", "(7\xa0N)", "0\xa0%")
+    assert block.header == ("test", "stroke [mm]", "force [N]", "outside [%]")
+    assert block.rows[0] == ("a", "12.3", "\u22121\u202f230 to 5", "25")
+    assert block.rows[1] == ("b", "\u2013", "(7)", "0")
     assert block.folded
+
+
+def test_rows_stand_side_by_side_where_people_compare_them() -> None:
+    block = Table("Tests", COLUMNS, ROWS).across()
+    assert block.header == ("test", "a", "b")
+    assert block.rows == (
+        ("stroke [mm]", "12.3", "\u2013"),
+        ("force [N]", "\u22121\u202f230 to 5", "(7)"),
+        ("outside [%]", "25", "0"),
+    )
 
 
 def test_plain_data_is_in_si_with_an_own_name_for_each_number() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import shutil
@@ -37,6 +38,28 @@ addEventListener("load", () => {{
   const says = (e) => e.getAttribute("alt") || e.getAttribute("aria-label") || e.querySelector?.("title")?.textContent;
   const named = (e) => `${{e.tagName}}.${{e.className}} ${{(e.textContent || "").trim().slice(0, 40)}}`;
   const scrolled = (e) => e && e !== page.body && (/auto|scroll/.test(style(e).overflowX) || scrolled(e.parentElement));
+  const faults = (img) => {{
+    const [kind, data] = img.src.split(";base64,"), name = (e) => e.textContent.trim();
+    if (kind !== "data:image/svg+xml") return [];
+    const place = document.createElement("div");
+    place.style.cssText = `position: absolute; left: 0; top: 0; width: ${{img.getBoundingClientRect().width}}px`;
+    place.innerHTML = new TextDecoder().decode(Uint8Array.from(atob(data), (c) => c.charCodeAt(0)));
+    document.body.append(place);
+    const svg = place.querySelector("svg"), found = [];
+    svg.style.cssText = "width: 100%; height: auto; display: block";
+    const edge = svg.getBoundingClientRect();
+    const texts = [...svg.querySelectorAll("text")].filter(name).map((e) => [name(e), e.getBoundingClientRect()]);
+    for (const [text, r] of texts)
+      if (r.left < edge.left - 1 || r.right > edge.right + 1 || r.top < edge.top - 2 || r.bottom > edge.bottom + 1)
+        found.push(`cut: ${{text}} in ${{img.alt.slice(0, 60)}}`);
+    for (const [i, [text, r]] of texts.entries())
+      for (const [other, q] of texts.slice(i + 1))
+        if (Math.min(r.right, q.right) - Math.max(r.left, q.left) > 1.5 &&
+            Math.min(r.bottom, q.bottom) - Math.max(r.top, q.top) > 0.35 * Math.min(r.height, q.height))
+          found.push(`over one another: ${{text}} and ${{other}} in ${{img.alt.slice(0, 60)}}`);
+    place.remove();
+    return found;
+  }};
   document.title = JSON.stringify({{
     width: inside.innerWidth,
     scroll: root.scrollWidth,
@@ -45,6 +68,8 @@ addEventListener("load", () => {{
     silent: [...page.querySelectorAll("img, svg:not([aria-hidden=true])")].filter((e) => !says(e)).map(named),
     broken: [...page.querySelectorAll("img")].filter((e) => !e.naturalWidth).map(named),
     wide: every.filter((e) => e.getBoundingClientRect().right > inside.innerWidth + 1 && !scrolled(e)).map(named),
+    sideways: [...page.querySelectorAll(".scroll")].filter((e) => e.scrollWidth > e.clientWidth + 1).map(named),
+    written: [...page.querySelectorAll("img")].flatMap(faults),
     cut: every.filter((e) => style(e).overflowX === "hidden" && e.scrollWidth > e.clientWidth + 1).map(named),
   }});
 }});
@@ -77,13 +102,14 @@ def shown(page: str, width: int, folder: Path) -> tuple[dict[str, Any], list[str
     return json.loads(unescape(title[1])), console
 
 
-@pytest.mark.parametrize("width", [400, 1400])
+@pytest.mark.parametrize("width", [400, 1024, 1400])
 def test_the_page_fits_the_screen_asks_for_nothing_and_says_what_its_pictures_show(page, width, tmp_path) -> None:
     seen, console = shown(page, width, tmp_path)
     assert seen["width"] == width
     assert seen["scroll"] <= width
     assert seen["pictures"] > 5
-    assert [seen[name] for name in ("requests", "silent", "broken", "wide", "cut")] == [[]] * 5
+    assert [seen[name] for name in ("requests", "silent", "broken", "wide", "cut", "written")] == [[]] * 6
+    assert width < 1400 or seen["sideways"] == []
     assert console == []
 
 
@@ -91,12 +117,18 @@ def test_what_is_wrong_with_a_page_is_seen(tmp_path) -> None:
     """A page with every fault: else the test above would pass whatever it looked at."""
     page = """<body><img src="data:,x"><img alt="far" src="https://example.org/far.png">
     <div style="width: 900px">wide</div><div style="overflow: hidden; width: 90px"><p style="width: 300px">cut</p></div>
+    <div class="scroll" style="overflow-x: auto; width: 90px"><p style="width: 300px">far</p></div>
     <script>console.error("wrong")</script>"""
+    texts = [f'<text x="{x}" y="20">{text}</text>' for x, text in ((20, "one"), (25, "two"), (180, "beyond"))]
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 200 40">{"".join(texts)}</svg>'
+    data = base64.b64encode(svg.encode()).decode()
+    page += f'<img style="width: 200px" alt="of words" src="data:image/svg+xml;base64,{data}">'
     seen, console = shown(page, 400, tmp_path)
     assert seen["requests"] == ["https://example.org/far.png"]
     assert len(seen["silent"]) == 1
     assert len(seen["broken"]) == 2
-    assert [len(seen[name]) > 0 for name in ("wide", "cut")] == [True, True]
+    assert [len(seen[name]) > 0 for name in ("wide", "cut", "sideways")] == [True, True, True]
+    assert sorted(seen["written"]) == ["cut: beyond in of words", "over one another: one and two in of words"]
     assert seen["scroll"] > 400
     assert any("wrong" in line for line in console)
 

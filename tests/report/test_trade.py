@@ -127,8 +127,8 @@ def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_directi
         "640",
         "0.085",
         "\u2212288",
-        "(\u22127\u00a0N)",
-        "\u2212410\u00a0N",
+        "(\u22127)",
+        "\u2212410",
     ):
         assert cell in page
     assert "21.5" in page
@@ -141,8 +141,8 @@ def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> N
 
 
 def test_the_page_has_the_extremes_of_a_record_that_is_neither_sine_nor_constant_velocity(page: str) -> None:
-    ends = ("\u2212678 to 2\u202f350\u00a0N", "\u22120.456 to 1.23\u00a0m/s")
-    for cell in ("knock-7", *ends, "32.1\u00a0mm", "0.654\u00a0s"):
+    ends = ("\u2212678 to 2\u202f350", "\u22120.456 to 1.23")
+    for cell in ("knock-7", *ends, "32.1", "0.654"):
         assert cell in page
 
 

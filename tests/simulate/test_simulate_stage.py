@@ -204,7 +204,7 @@ def test_a_force_that_comes_with_the_stiffness_is_explained(damper) -> None:
     times = {(r.signal, r.to_voltage_V): r for r in ride(damper).responses}
     force = times["force", 150.0]
     assert force.note.startswith(
-        "96% of the step come with the stiffness of the oil spring, k from 1.99e+05 to 4.23e+05 N/m"
+        "96 % of the step comes before the oil has flowed: k goes with the valve from 199 to 423 kN/m"
     )
     assert times["voltage", 150.0].note == ""
     rows = tuple(row.model_copy(update={"k_N_per_m": 199e3}) for row in damper.base)

@@ -127,9 +127,9 @@ def _reaction_bands(ax: Axes, bottom: int, right: float) -> None:
             continue
         ax.barh(height, end - band.low, left=band.low, height=0.8, color=shade, edgecolor=AXIS, linewidth=0.5)
         to_left = band.low > 0.5 * right
-        side = {"xytext": (-3 if to_left else 3, 0), "ha": "right" if to_left else "left"}
-        name = band.text.replace(" uncomfortable", "")
-        ax.annotate(name, (band.low, height), textcoords="offset points", va="center", fontsize=8.0, **side)
+        offset, side = (-3, "right") if to_left else (3, "left")
+        name, at = band.text.replace(" uncomfortable", ""), (band.low, height)
+        ax.annotate(name, at, (offset, 0), textcoords="offset points", ha=side, va="center", fontsize=8.0)
 
 
 # --- Chart of reduced comfort (ISO 2631:1978) ---

@@ -105,7 +105,7 @@ def _carried(damper: Damper, before: float, after: float, forces: tuple[float, f
         return ""
     return (
         f"{100.0 * min(share, 1.0):.0f} % of the step comes before the oil has flowed: k goes with the valve from "
-        f"{rows[before] / 1000.0:.3g} to {rows[after] / 1000.0:.3g} kN/m, and a loaded oil spring changes its force at once"
+        f"{rows[before] / 1e3:.3g} to {rows[after] / 1e3:.3g} kN/m, and a loaded oil spring changes its force at once"
     )
 
 

@@ -1,0 +1,92 @@
+"""The first screen: a sentence, the loop that is missed with its difference, what closes the gap, the best policy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pzd.report.blocks import amount
+from pzd.report.page import answer
+from pzd.report.plots.answer import best_policy, closing, missed_loop
+
+
+@pytest.fixture
+def context_of(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What the report of a run is made from."""
+
+    def context(run: Any) -> Any:
+        seen: list[Any] = []
+        monkeypatch.setattr("pzd.report.page.page", lambda found, jobs: seen.append(found) or "")
+        run.told()
+        return seen[0]
+
+    return context
+
+
+def test_the_sentence_names_what_is_missing_and_how_far_the_error_falls(run: Any, context_of: Any) -> None:
+    """In r.m.s.: W_s goes from 0.0121 = 0.11^2 to 0.0009 = 0.03^2."""
+    told = answer(context_of(run)).replace("\xa0", " ")
+    assert told == (
+        "The simple model lacks turbulent flow through a sharp orifice (97 % sure): with it the error on tests that no "
+        "fit has seen falls from 11 % to 3 % of the force; noise alone leaves 2.8 %."
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"verdict": "none", "effects": ()}, "The simple model describes this damper as well as these tests can tell"),
+        (
+            {"verdict": "unexplained", "effects": ()},
+            "Something is missing that the library of effects does not explain",
+        ),
+        ({"verdict": "ambiguous", "effects": ()}, "These tests do not settle whether anything is missing"),
+        ({"gap": None}, "The simple model lacks turbulent flow through a sharp orifice (97"),
+    ],
+)
+def test_every_verdict_has_its_sentence(run: Any, context_of: Any, changes: dict[str, Any], said: str) -> None:
+    told = answer(context_of(run.with_diagnosis(**changes)))
+    assert told.startswith(said)
+    assert told.endswith(".")
+
+
+def test_the_difference_below_is_measured_less_model_on_a_scale_of_its_own(run: Any, context_of: Any) -> None:
+    """The simple model lacks q w |w|: with q = 1510 N s2/m2 and w of some 0.3 m/s more than a hundred newtons."""
+    (panel,) = missed_loop(context_of(run))
+    upper, lower = panel.figure.axes
+    measured, simple, final = (line.get_ydata() * 1000.0 for line in upper.lines)
+    zero, missed, left = (line.get_ydata() for line in lower.lines)
+    assert np.all(np.asarray(zero) == 0.0)
+    assert missed == pytest.approx(measured - simple)
+    assert left == pytest.approx(measured - final)
+    assert np.abs(missed).max() > 100.0 > np.abs(left).max()
+    assert f"up to {amount(np.abs(missed).max(), 'N', 2)}" in panel.caption
+    assert lower.get_ylim()[1] < 0.5 * 1000.0 * upper.get_ylim()[1]
+
+
+def test_the_bars_are_errors_in_percent_of_the_force_with_the_interval_of_the_adopted(
+    run: Any, context_of: Any
+) -> None:
+    context = context_of(run)
+    gap = context.diagnosed.diagnosis.gap
+    (panel,) = closing(context)
+    (ax,) = panel.figure.axes
+    assert [bar.get_width() ** 2 / 1e4 for bar in ax.patches] == pytest.approx([gap.noise_floor, gap.after, gap.before])
+    ends = ax.collections[0].get_segments()[0][:, 0]
+    expected = [gap.after - 1.96 * gap.standard_error, gap.after + 1.96 * gap.standard_error]
+    assert (ends / 100.0) ** 2 == pytest.approx(expected)
+    assert [label.get_text() for label in ax.get_yticklabels()] == [
+        "noise alone",
+        "with orifice quadratic",
+        "simple model",
+    ]
+
+
+def test_the_best_policy_is_the_one_with_the_least_a_w_and_stands_out(run: Any, context_of: Any) -> None:
+    """Dynamically the best fixed voltage beats the controlled one, by the table not: the nearest to a car counts."""
+    (panel,) = best_policy(context_of(run))
+    bold = [text.get_text() for text in panel.figure.axes[0].texts if text.get_weight() == "bold"]
+    assert bold == ["best fixed voltage"]
+    assert "best fixed voltage is the most comfortable" in panel.caption
