@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # each is imported when it is first used: an import of the pa
     from pzd.front.rides import ride
     from pzd.front.runs import load, run
     from pzd.front.stages import diagnose, identify
+    from pzd.front.vibration import rate
 
 __all__ = [
     "Damper",
@@ -24,6 +25,7 @@ __all__ = [
     "diagnose",
     "identify",
     "load",
+    "rate",
     "read",
     "ride",
     "run",
@@ -36,6 +38,7 @@ _MODULES = {
     "rides": ("ride",),
     "runs": ("load", "run"),
     "stages": ("diagnose", "identify"),
+    "vibration": ("rate",),
 }
 """Modules of the front door by what each offers. No module of the package bears the name of one of these functions."""
 
