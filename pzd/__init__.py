@@ -12,6 +12,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # each is imported when it is first used: an import of the package takes no time
+    from pzd.front.comparison import changes
     from pzd.front.dampers import Damper, table
     from pzd.front.records import Test, read
     from pzd.front.rides import ride
@@ -22,6 +23,7 @@ if TYPE_CHECKING:  # each is imported when it is first used: an import of the pa
 __all__ = [
     "Damper",
     "Test",
+    "changes",
     "diagnose",
     "identify",
     "load",
@@ -33,6 +35,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "comparison": ("changes",),
     "dampers": ("Damper", "table"),
     "records": ("Test", "read"),
     "rides": ("ride",),
