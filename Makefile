@@ -83,6 +83,15 @@ nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of 
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py
 
+.PHONY: docs
+docs: $(DEV)  ## Make a static site of the pages, the notebook and the reference: build/site/index.html
+	PYTHONPATH=. $(BIN)/python docs/gather.py
+	PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+.PHONY: notebook
+notebook: $(DEV)  ## Execute docs/first_hour.ipynb anew, and keep its outputs and pictures in it
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests $(BIN)/python tests/studies/notebook.py
+
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend
 	$(BIN)/ruff format .
