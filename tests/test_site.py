@@ -80,7 +80,8 @@ def test_the_notebook_says_today_what_it_says_on_its_page(tmp_path: Path, monkey
 @pytest.mark.ci
 def test_every_link_of_the_site_leads_somewhere(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -r requirements-dev.lock")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
+    paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": paths, "NO_MKDOCS_2_WARNING": "1"}
     subprocess.run([sys.executable, ROOT / "docs" / "gather.py", tmp_path / "docs"], env=environment, check=True)
     config = (ROOT / "mkdocs.yml").read_text().replace("docs_dir: build/docs", f"docs_dir: {tmp_path / 'docs'}")
     (tmp_path / "mkdocs.yml").write_text(config.replace("site_dir: build/site", f"site_dir: {tmp_path / 'site'}"))
