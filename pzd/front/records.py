@@ -45,7 +45,7 @@ UNNAMED = "test"
 FEWEST = 2
 """Samples of a test."""
 _OF_ARRAYS = re.compile(
-    r"say (?:(?P<what>sign|units): \{(?P<name>\w+): (?P<value>-?\w+)\}(?:, or units: .*)?|rate_Hz: N.*)"
+    r"(?:say )?\b(?:rate_Hz: N.*|(?P<what>sign|units): \{(?P<name>\w+): (?P<value>-?\w+)\}(?:, or units: .*)?)"
 )
 """Advice about a file."""
 
