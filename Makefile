@@ -5,6 +5,7 @@ N ?= 20
 BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEV := .venv/.dev
+SITE := .venv/.site
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
         --generate-hashes --no-strip-extras --no-emit-index-url --custom-compile-command "make lock"
@@ -36,7 +37,7 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 	$(BIN)/mypy
 
 .PHONY: ci
-ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
+ci: check $(SITE)  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m ci --durations 10
 
 .PHONY: coverage
@@ -83,6 +84,15 @@ nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of 
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py
 
+.PHONY: docs
+docs: $(SITE)  ## Make a static site of the pages, the notebook and the reference: build/site/index.html
+	PYTHONPATH=. $(BIN)/python docs/gather.py
+	PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+.PHONY: notebook
+notebook: $(DEV)  ## Execute docs/first_hour.ipynb anew, and keep its outputs and pictures in it
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests $(BIN)/python tests/studies/notebook.py
+
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend
 	$(BIN)/ruff format .
@@ -94,6 +104,7 @@ lock: $(DEV)  ## Resolve the dependencies again, for Python 3.11 to 3.13 and eve
 	$(LOCK) --upgrade --group build --output-file requirements-build.lock
 	$(LOCK) --upgrade --group dev --extra cluster --extra formats pyproject.toml --constraint requirements.lock \
 	        --constraint requirements-build.lock --output-file requirements-dev.lock
+	$(LOCK) --upgrade --group docs --constraint requirements-dev.lock --output-file requirements-docs.lock
 
 .PHONY: clean
 clean:  ## Remove .venv, caches and builds; results in runs/ and figures/ stay
@@ -110,4 +121,8 @@ $(RUNTIME): requirements.lock requirements-build.lock pyproject.toml
 
 $(DEV): $(RUNTIME) requirements-dev.lock
 	$(PIP) --require-hashes -r requirements-dev.lock
+	@touch $@
+
+$(SITE): $(DEV) requirements-docs.lock
+	$(PIP) --require-hashes -r requirements-docs.lock
 	@touch $@

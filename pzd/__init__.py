@@ -12,18 +12,22 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # each is imported when it is first used: an import of the package takes no time
+    from pzd.front.comparison import changes
     from pzd.front.dampers import Damper, table
     from pzd.front.records import Test, read
     from pzd.front.rides import ride
     from pzd.front.runs import load, run
     from pzd.front.stages import diagnose, identify
+    from pzd.front.vibration import rate
 
 __all__ = [
     "Damper",
     "Test",
+    "changes",
     "diagnose",
     "identify",
     "load",
+    "rate",
     "read",
     "ride",
     "run",
@@ -31,11 +35,13 @@ __all__ = [
 ]
 
 _MODULES = {
+    "comparison": ("changes",),
     "dampers": ("Damper", "table"),
     "records": ("Test", "read"),
     "rides": ("ride",),
     "runs": ("load", "run"),
     "stages": ("diagnose", "identify"),
+    "vibration": ("rate",),
 }
 """Modules of the front door by what each offers. No module of the package bears the name of one of these functions."""
 

@@ -44,7 +44,7 @@ def code_of(text: str) -> str:
 
 def pages() -> list[str]:
     """Every page of the documentation, from the root; `runs/` holds results below its own page."""
-    folders = [ROOT, ROOT / "configs", ROOT / "runs"]
+    folders = [ROOT, ROOT / "configs", ROOT / "runs", ROOT / "docs"]
     found = [path for folder in folders for path in folder.glob("*.md")] + [*PACKAGE.rglob("*.md")]
     return sorted(path.relative_to(ROOT).as_posix() for path in found)
 

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 DECLARED = [Requirement(text) for text in PROJECT["project"]["dependencies"]]
 EXTRAS = [Requirement(text) for extra in PROJECT["project"]["optional-dependencies"].values() for text in extra]
-LOCKS = ("requirements.lock", "requirements-build.lock", "requirements-dev.lock")
+LOCKS = ("requirements.lock", "requirements-build.lock", "requirements-dev.lock", "requirements-docs.lock")
 PYTHONS = ("3.11", "3.12", "3.13")
 
 
@@ -89,10 +89,12 @@ def test_what_a_format_needs_is_an_extra() -> None:
 
 
 def test_the_locks_agree_with_each_other() -> None:
-    runtime, build, dev = map(pins, LOCKS)
+    runtime, build, dev, docs = map(pins, LOCKS)
     assert {name: version(pin) for name, pin in (runtime | build).items()} == {
         name: version(pin) for name, pin in dev.items() if name in runtime | build
     }
+    shared = docs.keys() & dev.keys()
+    assert {name: version(docs[name]) for name in shared} == {name: version(dev[name]) for name in shared}
 
 
 def test_every_locked_version_runs_on_every_supported_python() -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from pzd.cli import campaigns, changes, export, look, peers, stages, start
+from pzd.cli import campaigns, changes, export, look, peers, rate, stages, start
 from pzd.cli.interrupt import (
     INTERRUPTED,
     end_at_once_when_interrupted,
@@ -34,7 +34,7 @@ app = typer.Typer(
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_MODULES = (stages, peers, changes, look, export, campaigns, start)
+_MODULES = (stages, peers, changes, look, rate, export, campaigns, start)
 _COMMANDS: tuple[Callable[..., int], ...] = tuple(command for module in _MODULES for command in module.COMMANDS)
 for _command in _COMMANDS:
     app.command()(_command)

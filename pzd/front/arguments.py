@@ -39,7 +39,7 @@ def as_python_errors() -> Iterator[None]:
         yield
     except UserError as error:
         kind = OSError if isinstance(error, FilesError) else ValueError
-        raise kind("\n".join(_IN_CONFIG.sub("", message) for message in error.messages)) from error
+        raise kind("\n".join(_IN_CONFIG.sub("", message) for message in error.messages)) from None
 
 
 def numbers(name: str, values: Any, size: int | None = None) -> Array:

@@ -45,7 +45,9 @@ def pipeline_of(config: RunConfig, artefacts: Mapping[str, Artefact]) -> InMemor
     return InMemory(config, run, stages(config), lambda _: None, artefacts=dict(artefacts))
 
 
-def pipeline_on(tests: Any, control: Control, setting: str | None, limits: Any = None, **blocks: Any) -> InMemory:
+def pipeline_on(
+    tests: Any, control: Control, setting: str | None, limits: Any = None, called: str = "tests", **blocks: Any
+) -> InMemory:
     """Return the pipeline on tests.
 
     Parameters
@@ -54,6 +56,7 @@ def pipeline_on(tests: Any, control: Control, setting: str | None, limits: Any =
     control : the control signal
     setting : the one in use
     limits : of the stand, keys of `rig.limits`
+    called : name of the argument with the tests, for messages
     blocks : of the config
 
     Raises
@@ -66,4 +69,4 @@ def pipeline_on(tests: Any, control: Control, setting: str | None, limits: Any =
     if limits is not None and not isinstance(limits, Mapping):
         raise TypeError(f"limits: must be a mapping such as {{'stroke_m': 0.1}} (got {type(limits).__name__})")
     config = config_of(control, setting, rig={"limits": dict(limits or {})}, **blocks)
-    return pipeline_of(config, {Rig.folder: rig_of(tests, config.rig.limits, control)})
+    return pipeline_of(config, {Rig.folder: rig_of(tests, config.rig.limits, control, called)})

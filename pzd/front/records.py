@@ -42,13 +42,19 @@ if TYPE_CHECKING:
 UNNAMED = "test"
 """Name of a test that was given none; among several it becomes `test-1`, `test-2` and so on."""
 
-_OF_ARRAYS = re.compile(r"say (sign|units): \{(\w+): (-?\w+)\}")
+FEWEST = 2
+"""Samples of a test."""
+_OF_ARRAYS = re.compile(
+    r"(?:say )?\b(?:rate_Hz: N.*|(?P<what>sign|units): \{(?P<name>\w+): (?P<value>-?\w+)\}(?:, or units: .*)?)"
+)
 """Advice about a file."""
 
 
 def _as_argument(advice: re.Match[str]) -> str:
     """Return advice about a file as what to pass here."""
-    what, name, value = advice.groups()
+    what, name, value = advice["what"], advice["name"], advice["value"]
+    if what is None:
+        return "pass time in seconds, which are numbers of samples over samples a second"
     return f"pass {name}=-{name}" if what == "sign" else f"pass {name} in SI, not in {value}"
 
 
@@ -101,6 +107,8 @@ class Test(Result):
             if given is not None and not isinstance(given, str):
                 raise TypeError(f"{argument}: must be text (got {type(given).__name__})")
         clock = numbers("time", time)
+        if clock.size < FEWEST:
+            raise ValueError(f"time: a test needs {FEWEST} samples at least (got {clock.size})")
         channels: dict[Any, Array | float] = {TIME: clock}
         for quantity, values in ((DISPLACEMENT, displacement), (FORCE, force)):
             channels[quantity] = numbers(quantity.name, values, clock.size)

@@ -271,7 +271,7 @@ def diagnose(
     TypeError : when an argument is of the wrong type
     ValueError : when a key is none that a config may have, or the tests do not go together
     """
-    blocks = {"identify": identify or {}, "diagnose": keys_of_the_block}
+    blocks: dict[str, Any] = {"identify": identify or {}, "diagnose": keys_of_the_block}
     made = pipeline_on(tests, control_of(control), setting, limits, seed=seed, **blocks)
     made.jobs = jobs
     made.setting()
