@@ -109,7 +109,7 @@ def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]
     """Find the glitches of a channel: up to three samples that jump away from their neighbours and back.
 
     A glitch deviates from the running median of seven samples by ten robust standard deviations of that deviation,
-    by four times the steepest usual step, and by 2 % of the usual range.
+    by four times the steepest usual step of that median, and by 2 % of the usual range.
 
     Parameters
     ----------
@@ -120,9 +120,11 @@ def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]
     -------
     indices of the samples
     """
-    deviation = np.abs(deviation_from_median(values) if deviation is None else deviation)
+    away = deviation_from_median(values) if deviation is None else deviation
+    deviation = np.abs(away)
     noise = 1.4826 * float(np.median(deviation))
-    steepest = float(np.percentile(np.abs(np.diff(values)), 99.0)) if values.size > 1 else 0.0
+    # Of the median, for glitches that come often would themselves be the steepest steps.
+    steepest = float(np.percentile(np.abs(np.diff(values - away)), 99.0)) if values.size > 1 else 0.0
     low, high = np.percentile(values, (0.5, 99.5))
     least = max(10.0 * noise, 4.0 * steepest, 0.02 * float(high - low), 1e-300)
     rows: NDArray[np.int64] = np.flatnonzero(deviation > least)
@@ -171,6 +173,17 @@ def voltage_scale(records: Iterable[Record]) -> float:
         return 0.0
     low, high = min(e[0] for e in extremes), max(e[1] for e in extremes)
     return max(high - low, abs(low), abs(high))
+
+
+def distinct(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Return the records without copies of another: a test that was saved twice says no more than once."""
+    found: dict[tuple[object, ...], Record] = {}
+    for record in records:
+        voltage, temperature = record.median_voltage(), record.median_temperature()
+        motion = (record.displacement, record.velocity, record.force)
+        samples = tuple(np.ascontiguousarray(values).tobytes() for values in motion)
+        found.setdefault((record.setting, voltage, temperature, *map(hash, samples)), record)
+    return tuple(found.values())
 
 
 def is_constant(record: Record, scale: float) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Rig
-from pzd.record import Array, Record, conditions, is_constant, sliced, voltage_scale
+from pzd.record import Array, Record, conditions, distinct, is_constant, sliced, voltage_scale
 from pzd.signals.cycles import Cycles, cycles, drift_over_cycles, settled_cycles
 from pzd.signals.jumps import denoised_control
 from pzd.signals.lack_of_fit import ShortTimeMask
@@ -292,7 +292,7 @@ def _smoothed_displacement(record: Record) -> Record:
 
 def unsaturated_records(rig: Rig, setting: str | None) -> tuple[list[Record], tuple[str, ...]]:
     """Return the records of a setting with unsaturated force, and the names of the others; all where none is left."""
-    mine = [record for record in rig.records if record.setting == setting]
+    mine = [record for record in distinct(rig.records) if record.setting == setting]
     saturated = {
         entry.name
         for entry in rig.entries

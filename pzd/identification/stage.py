@@ -10,7 +10,7 @@ from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
-from pzd.record import Condition, Labels, Record, conditions, merged_voltages
+from pzd.record import Condition, Labels, Record, conditions, distinct, merged_voltages
 from pzd.schema.errors import ConfigError, DataError, counted, supported
 from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 
@@ -55,7 +55,7 @@ def identify(
 
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
-    constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
+    constant, moving = conditions(distinct(rig.records), identify.group.voltage_V, identify.group.temperature_degC)
     found = _constant_rows(constant, identify, seed, progress, jobs)
     rows = {_labels(row): row for row, _ in found}
     auxiliary = {_labels(row): row for _, row in found if row is not None}

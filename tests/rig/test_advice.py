@@ -242,5 +242,5 @@ def test_an_encoding_that_is_advised_reads_the_file(tmp_path: Path) -> None:
 def test_the_advice_of_a_finding_is_accepted(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"velocity_m_per_s": 2.0 * np.gradient(X, TIME)}))
     (told,) = run(tmp_path).entries[0].findings
-    assert told.follows.endswith("say columns: {velocity: ''} to have it derived")
+    assert told.follows.endswith("left out: the speed is derived from the displacement")
     assert run(tmp_path, {"path": "a.csv", "columns": {"velocity": ""}}).entries[0].findings == ()

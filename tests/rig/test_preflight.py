@@ -259,11 +259,16 @@ def two_tests(one: Record) -> Record:
 FAULTS: dict[str, Callable[[Record], Record]] = {
     "cycle_count": lambda one: cut(one, 2.2),
     "delay": lambda one: replace(one, force=np.roll(one.force, 12)),
+    "drift": lambda one: replace(one, force=one.force + np.linspace(0.0, 0.2, one.time.size) * np.ptp(one.force)),
+    "dropouts": lambda one: replace(one, force=np.where(np.arange(one.time.size) % 700 == 5, 0.0, one.force + 900.0)),
+    "gain_step": lambda one: replace(one, force=one.force * np.where(one.time > 0.5 * one.time[-1], 1.1, 1.0)),
+    "held_channel": lambda one: replace(one, force=one.force[np.arange(one.time.size) // 10 * 10]),
     "hum": lambda one: replace(one, force=one.force + 0.1 * np.ptp(one.force) * np.sin(100.0 * np.pi * one.time)),
     "jumps": lambda one: replace(
         one, displacement=np.where(np.arange(one.time.size) < 4000, 0.0, 0.02) + one.displacement
     ),
     "offset": lambda one: replace(one, force=one.force + 0.2 * np.ptp(one.force)),
+    "quantisation": lambda one: replace(one, displacement=2e-4 * np.rint(one.displacement / 2e-4)),
     "reach": lambda one: one,  # the limits of the stand are what changes
     "recorded_velocity": lambda one: one,  # and here the velocity
     "resolution": lambda one: replace(

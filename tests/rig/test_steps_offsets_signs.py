@@ -108,16 +108,17 @@ def test_a_damper_that_hardly_slips_has_no_wrong_sign(tmp_path: Path, rng: np.ra
     assert min(works) < 0.0 < max(works)
 
 
-def test_which_channel_is_turned_over_is_found_by_the_gas_force_the_other_files_and_the_header(
+def test_which_channel_is_turned_over_is_found_by_the_other_files_and_the_header_and_else_asked(
     tmp_path: Path,
 ) -> None:
+    """Never by the mean force: rebound that is stiffer than compression would pass for a gas force, and be turned."""
     x = sine(0.01, 1.5)
     force = damper(x, gas=-200.0)
-    stored(tmp_path / "gas", "a", x, -force)
-    assert "force has the wrong sign, since the mean force of +200" in refused(tmp_path / "gas")[0]
-    assert "say sign: {force: -1}" in refused(tmp_path / "gas")[0]
-    stored(tmp_path / "gas", "a", -x, force)
-    assert "say sign: {displacement: -1}" in refused(tmp_path / "gas")[0]
+    for turned in ((x, -force), (-x, force)):
+        stored(tmp_path / "alone", "a", *turned)
+        (said,) = refused(tmp_path / "alone")
+        assert "force or displacement has the wrong sign, or this is an active load and no damper" in said
+        assert "say sign: {force: -1} where the displacement grows in rebound, or sign: {displacement: -1}" in said
     for turned, channel in (((x, -force - 100.0), "force"), ((-x, force + 100.0), "displacement")):
         stored(tmp_path / channel, "a", x, force + 100.0)
         stored(tmp_path / channel, "b", *turned)
@@ -129,3 +130,31 @@ def test_which_channel_is_turned_over_is_found_by_the_gas_force_the_other_files_
     write(tmp_path / "head" / "a.csv", lines({"time_s": TIME, "Einfederung [mm]": -1e3 * x, "force_N": plain}))
     entry = {"path": "a.csv", "columns": {"displacement": "Einfederung [mm]"}}
     assert "displacement has the wrong sign, since its header" in refused(tmp_path / "head", entry)[0]
+
+
+def test_hints_of_one_rig_agree_over_its_files(tmp_path: Path) -> None:
+    """Rebound is three times compression; of five files that are turned over one alone would be told otherwise."""
+    x = sine(0.01, 1.5)
+    v = np.gradient(x, TIME)
+    right = np.where(v > 0.0, 3000.0, 1000.0) * v + 100.0 * np.sign(v)
+    stored(tmp_path, "right", x, right)
+    for number in range(4):
+        stored(tmp_path, f"turned{number}", (0.7 + 0.1 * number) * x, -(0.7 + 0.1 * number) * right)
+    stored(tmp_path, "odd", x, -(right - 1500.0))
+    said = refused(tmp_path)
+    assert len(said) == 5
+    assert all("force has the wrong sign" in one and "say sign: {force: -1}" in one for one in said), said
+
+
+def test_displacement_and_force_exchanged_are_told_as_such(tmp_path: Path, rng: np.random.Generator) -> None:
+    x = sine(0.01, 1.5)
+    force = damper(x) + rng.standard_normal(x.size)
+    rows = {"time_s": TIME, "Weg [mm]": force / 10.0, "Kraft [N]": 1e3 * x}
+    write(tmp_path / "a.csv", lines(rows))
+    named = {"columns": {"displacement": "Weg [mm]", "force": "Kraft [N]"}}
+    (said,) = refused(tmp_path, {"path": "a.csv"} | named)
+    assert "displacement and force are exchanged" in said
+    assert 'say columns: {displacement: "Kraft [N]", force: "Weg [mm]"}, with their units' in said
+    exchanged = {"columns": {"displacement": "Kraft [N]", "force": "Weg [mm]"}}
+    units = {"units": {"displacement": "mm", "force": "N"}}
+    assert len(run(tmp_path, {"path": "a.csv"} | exchanged | units).records) == 1

@@ -6,6 +6,7 @@ listing -> layout -> format reader -> channels -> tests -> refusals -> clock -> 
 from __future__ import annotations
 
 import glob
+import hashlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pzd.artefacts import IngestRow
+from pzd.artefacts import Finding, IngestRow
 from pzd.quantities import (
     ACCELERATION,
     DISPLACEMENT,
@@ -35,9 +36,10 @@ from pzd.rig.files.clock import clock_remarks
 from pzd.rig.files.counted import beside_counted
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, Values, layouts
-from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
+from pzd.rig.files.refusals import refuse, sign_faults, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.rig.preflight import PreflightRecord
+from pzd.rig.preflight.motion import recorded_velocity
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import safe_name
 from pzd.signals.cycles import cycles
@@ -154,7 +156,24 @@ def preflight_record(
         IngestRow(record=name, file=test.sheet.path.name, step=s.step, quantity=s.quantity, was=s.was, became=s.became)
         for s in steps
     )
-    return PreflightRecord(record, periodic, clean, limits, alone.removed or None, control, test.remarks, ingested)
+    examined = PreflightRecord(record, periodic, clean, limits, alone.removed or None, control, test.remarks, ingested)
+    at_odds = tuple(recorded_velocity(examined))
+    if not at_odds:
+        return examined
+    left_out = IngestRow(
+        record=name,
+        file=test.sheet.path.name,
+        step="left out",
+        quantity=VELOCITY.name,
+        was="at odds with the displacement",
+        became="derived",
+    )
+    return replace(
+        examined,
+        record=replace(record, velocity=clean.velocity),
+        remarks=(*test.remarks, *at_odds),
+        ingested=(*ingested, left_out),
+    )
 
 
 def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
@@ -294,16 +313,63 @@ def read(
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
     right = [both for both in tests if not works_on_the_rig(both[1])]
-    data_faults += [
-        sign_fault(test, alone, layout_of[test.sheet.path], right) for test, alone in tests if works_on_the_rig(alone)
-    ]
+    data_faults += sign_faults([both for both in tests if works_on_the_rig(both[1])], layout_of, right)
     if data_faults:
         raise DataError(data_faults)
     called = names([(test.sheet.path, test.number) for test, _ in tests])
-    return tuple(
-        partial(preflight_record, name, test, alone, limits, control)
-        for name, (test, alone) in zip(called, tests, strict=True)
-    )
+    told = with_copies_told([(name, *both) for name, both in zip(called, tests, strict=True)])
+    return tuple(partial(preflight_record, name, test, alone, limits, control) for name, test, alone in told)
+
+
+# --- Copies ---
+
+Named = tuple[str, RawRecord, DamperAlone]
+
+
+def with_copies_told(tests: Sequence[Named]) -> list[Named]:
+    """Report tests whose every sample is that of another of the same label, on the first of them.
+
+    Parameters
+    ----------
+    tests : each with its name
+
+    Returns
+    -------
+    the tests; identification and diagnosis count copies once
+    """
+    alike: dict[bytes, list[Named]] = {}
+    for one in tests:
+        alike.setdefault(_digest(*one[1:]), []).append(one)
+    found: list[Named] = []
+    for name, test, alone in tests:
+        same = [mate[0] for mate in alike[_digest(test, alone)] if _label(mate[1]) == _label(test)]
+        told = test.remarks
+        if len(same) > 1 and name == same[0]:
+            finding = Finding(
+                check="copies",
+                where="the whole record",
+                size=float(len(same)),
+                unit="records",
+                follows=f"{', '.join(same[1:])}: copies of it, sample by sample; they count once",
+            )
+            told = (*told, finding)
+        found.append((name, replace(test, remarks=told), alone))
+    return found
+
+
+def _digest(test: RawRecord, alone: DamperAlone) -> bytes:
+    """Return a digest of force and motion, as far as it was recorded."""
+    moved = [test.channels[quantity] for quantity in (VELOCITY, ACCELERATION) if quantity in test.channels]
+    samples = hashlib.sha256()
+    for values in (alone.displacement, alone.force, *moved):
+        samples.update(np.ascontiguousarray(values).tobytes())
+    return samples.digest()
+
+
+def _label(test: RawRecord) -> tuple[str | None, tuple[float, ...]]:
+    """Return the setting and the medians of the control signal and the temperature; NaN where there is none."""
+    channels = (test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE))
+    return test.setting, tuple(-273.15 if values is None else float(np.median(values)) for values in channels)
 
 
 def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]]:
@@ -366,5 +432,5 @@ def from_arrays(
     )
     ((test, alone),) = _tests_of(sheet, layout, labels, setting)
     if works_on_the_rig(alone):
-        raise DataError(sign_fault(test, alone, layout, ()))
+        raise DataError(sign_faults([(test, alone)], {test.sheet.path: layout}, ()))
     return preflight_record(name, test, alone, limits, control)

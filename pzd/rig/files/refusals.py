@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -10,9 +12,10 @@ from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array
 from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.clock import clock_faults, standstills
-from pzd.rig.files.layout import Layout
+from pzd.rig.files.layout import ChannelSpec, Layout
 from pzd.schema.errors import DataError
-from pzd.signals.measures import REVERSAL_SHARE, chance_work, despiked, reversals, slope, work
+from pzd.schema.yamltree import written
+from pzd.signals.measures import REVERSAL_SHARE, chance_work, despiked, reversals, rms, slope, work
 
 # --- Work over a whole test: negative where a sign is wrong ---
 
@@ -31,25 +34,73 @@ def works_on_the_rig(alone: DamperAlone) -> bool:
     return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 
-def sign_fault(
-    test: RawRecord, alone: DamperAlone, layout: Layout, others: Sequence[tuple[RawRecord, DamperAlone]]
-) -> str:
-    """Describe a test over which the damper does work on the rig, and guess which channel has the wrong sign.
+def sign_faults(
+    wrong: Sequence[tuple[RawRecord, DamperAlone]],
+    layout_of: Mapping[Path, Layout],
+    others: Sequence[tuple[RawRecord, DamperAlone]],
+) -> list[str]:
+    """Describe the tests over which the damper does work on the rig, and guess which channel has the wrong sign.
+
+    Where the tests of one layout would be told differently, that is told of all of them which most ask for: a channel
+    is turned over in all files of a rig or in none.
 
     Parameters
     ----------
-    test : the test, for its place
-    alone : displacement and force of the damper, a known fixture taken out
-    layout : specification of each quantity
+    wrong : the tests whose work is negative, with displacement and force of the damper
+    layout_of : file -> specification of each quantity
     others : the tests of the rig whose work is positive
     """
-    done = work(alone.displacement, alone.force)
-    what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
-    channel, why = _by_header(test, layout) or _by_others(test, alone, others) or _by_gas(alone) or (None, "")
-    sign = -next(spec.sign for spec in layout.channels if spec.quantity.name == (channel or FORCE.name))
-    if channel is None:
-        return f"{what}: force or displacement has the wrong sign; say sign: {{force: {sign}}}"
-    return f"{what}: {channel} has the wrong sign, since {why}; say sign: {{{channel}: {sign}}}"
+    faults = []
+    hints = [_hint(test, alone, layout_of[test.sheet.path], others) for test, alone in wrong]
+    for (test, alone), hint in zip(wrong, hints, strict=True):
+        layout = layout_of[test.sheet.path]
+        mates = [one for (mate, _), one in zip(wrong, hints, strict=True) if layout_of[mate.sheet.path] is layout]
+        usual = Counter(channel for channel, _ in mates).most_common(1)[0][0]
+        channel, why = hint if hint[0] == usual else next(one for one in mates if one[0] == usual)
+        done = work(alone.displacement, alone.force)
+        what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
+        signs = {spec.quantity.name: -spec.sign for spec in layout.channels}
+        x, force = (f"sign: {{{q.name}: {signs[q.name]}}}" for q in (DISPLACEMENT, FORCE))
+        if _exchanged(alone):
+            heads = [next(h for h in test.sheet.header if h in s.headers) for s in _both(layout)]
+            faults.append(
+                f"{what}: displacement and force are exchanged, since the displacement is rough and the force smooth; "
+                f"say columns: {{displacement: {written(heads[1])}, force: {written(heads[0])}}}, with their units"
+            )
+        elif channel is None:
+            faults.append(
+                f"{what}: force or displacement has the wrong sign, or this is an active load and no damper; say "
+                f"{force} where the displacement grows in rebound, or {x} where it grows in compression"
+            )
+        else:
+            faults.append(
+                f"{what}: {channel} has the wrong sign, since {why}; say sign: {{{channel}: {signs[channel]}}}"
+            )
+    return faults
+
+
+def _hint(
+    test: RawRecord, alone: DamperAlone, layout: Layout, others: Sequence[tuple[RawRecord, DamperAlone]]
+) -> tuple[str | None, str]:
+    """Return the channel that has the wrong sign and why; no channel where neither header nor other tests tell."""
+    return _by_header(test, layout) or _by_others(test, alone, others) or (None, "")
+
+
+def _both(layout: Layout) -> tuple[ChannelSpec, ChannelSpec]:
+    """Return the specifications of displacement and force."""
+    found = {spec.quantity: spec for spec in layout.channels}
+    return found[DISPLACEMENT], found[FORCE]
+
+
+EXCHANGED = 10.0
+"""Times that a displacement is rougher than its force where the two are exchanged: else it is the smoother of the two,
+the integral of a speed, and even noise of 1 in 1000 makes it no rougher than a smooth force."""
+
+
+def _exchanged(alone: DamperAlone) -> bool:
+    """Whether the displacement is the rougher of the two: it has the flanks and the noise of a force."""
+    x, force = (float(rms(np.diff(v, 2)) / np.std(v)) for v in (alone.displacement, alone.force))
+    return x > EXCHANGED * force
 
 
 def _by_header(test: RawRecord, layout: Layout) -> tuple[str, str] | None:
@@ -72,15 +123,6 @@ def _by_others(
     theirs = float(np.median(clear))
     channel = FORCE.name if mine * theirs < 0.0 else DISPLACEMENT.name
     return channel, f"the mean force is {mine:+.4g} N here and {theirs:+.4g} N in the files whose work is right"
-
-
-def _by_gas(alone: DamperAlone) -> tuple[str, str] | None:
-    """Judge by a gas force, which pushes the rod out: negative everywhere, less so the further the rod is out."""
-    offset = _offset(alone)
-    if offset is None:
-        return None
-    channel = FORCE.name if offset > 0.0 else DISPLACEMENT.name
-    return channel, f"the mean force of {offset:+.4g} N, if it is the gas force and no tare, is negative in extension"
 
 
 def _offset(alone: DamperAlone) -> float | None:

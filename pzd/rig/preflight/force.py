@@ -114,18 +114,22 @@ def _rise_with_speed(entries: list[RecordEntry]) -> bool:
 
 LEAST_DELAY = 1e-3
 """Smallest delay that is reported [s]; a smaller one is within the nuisances of a diagnosis."""
+SAMPLES = 2.0
+"""and the least in samples: the flank of a rigid damper lies between two, and is known to one."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
 AS_WELL = 2.0
 """A rigid damper without any delay explains the force as well where it leaves less than this times as much."""
-SIGMOIDS = (0.01, 0.03, 0.1, 0.3)
+SIGMOIDS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 """Where the friction of a rigid damper is rounded off, as a share of its top speed."""
-LONGEST_DELAY = 0.03
-"""Largest delay looked for [s], or a twentieth of the cycle where that is less."""
-TRIES = 31
-"""Delays that are tried, 2 ms from one to the next where they reach `LONGEST_DELAY`."""
+LONGEST_DELAY = 0.1
+"""Largest delay looked for in a motion without cycles [s]; in one with, half a cycle: a longer one is another's."""
+TRIES = 61
+"""Delays that are tried at first, a sixtieth of a cycle from one to the next,"""
+NARROWED = 21
+"""and then between the neighbours of the best, so often that they lie closer than half a sample."""
 ALIKE_DELAYS = 0.25
-"""Delays further than this share from the usual one are no recorder's, as those tried lie up to 2 ms apart."""
+"""Delays further than this share from the usual one are no recorder's: what is fitted to them differs as much."""
 
 
 def delay(test: PreflightRecord) -> Iterator[Finding]:
@@ -135,22 +139,44 @@ def delay(test: PreflightRecord) -> Iterator[Finding]:
     section, undelayed = reference_fit(test)
     if undelayed.residual < LEAST_RESIDUAL:
         return
-    longest = min(LONGEST_DELAY, test.cycles.period / 20.0) if test.cycles else LONGEST_DELAY
-    delays = np.linspace(-longest, longest, TRIES)
-    best = fit_element(section, section.delayed(delays))
-    size = float(delays[best.number])
-    inside = abs(size) >= max(LEAST_DELAY, 0.5 * section.step) and best.number not in (0, TRIES - 1)
-    if not inside or best.residual > EXPLAINS * undelayed.residual:
+    size, residual, at_edge = _best_delay(section, 0.5 * test.cycles.period if test.cycles else LONGEST_DELAY)
+    least = max(LEAST_DELAY, SAMPLES / test.record.rate, 0.5 * section.step)
+    if abs(size) < least or residual > EXPLAINS * undelayed.residual:
         return
-    if _residual_of_rigid_damper(section) >= AS_WELL * best.residual:
-        share = 1.0 - best.residual / undelayed.residual
+    if _residual_of_rigid_damper(section) >= AS_WELL * residual:
+        share = 1.0 - residual / undelayed.residual
+        edge = ", at the edge of the search: it may be more" if at_edge else ""
         yield Finding(
             check="delay",
-            where=f"the force is {'late' if size > 0.0 else 'early'} against the displacement, the whole record",
+            where=f"the force is {'late' if size > 0.0 else 'early'} against the displacement, the whole record{edge}",
             size=size,
             unit="s",
             follows=f"it takes {share:.0%} of what a Bingham element leaves; not corrected",
         )
+
+
+def _best_delay(section: Section, longest: float) -> tuple[float, float, bool]:
+    """Search for the delay of least squares, coarsely and then closer.
+
+    Parameters
+    ----------
+    section : with the force at any delay
+    longest : largest delay to try, either way [s]
+
+    Returns
+    -------
+    the delay [s], the share of the force's squares that it leaves, and whether it lies at the edge of the search
+    """
+    step = 2.0 * longest / (TRIES - 1)
+    delays = np.linspace(-longest, longest, TRIES)
+    best = fit_element(section, section.delayed(delays))
+    at_edge = best.number in (0, TRIES - 1)
+    size = float(delays[best.number])
+    while step > 0.5 * section.step:
+        delays = size + np.linspace(-step, step, NARROWED)
+        best = fit_element(section, section.delayed(delays))
+        size, step = float(delays[best.number]), 2.0 * step / (NARROWED - 1)
+    return size, best.residual, at_edge
 
 
 def drop_contradicting_delays(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
@@ -197,7 +223,9 @@ RATE = 250.0
 """A record without cycles is read at about this rate [Hz]."""
 LEAST_RESIDUAL = 2e-3
 """Share of the force's squares worth explaining: less is noise, or how coarse the element is."""
-_GRID = (24, 16)
+RIGID = 3e-4
+"""Least T0 / k that is tried, as a share of half the stroke: the flank of a rigid damper takes one sample."""
+_GRID = (28, 16)
 """Values of T0 / k and of C / k in the first search, each 30 to 50 % above the last."""
 _ZOOM = (7, 7)
 _ZOOMS = 4
@@ -309,7 +337,7 @@ def _first_grid(section: Section) -> _Grid:
     """Every element that a record may show; remembered, as both fits of a record begin with it."""
     half = 0.5 * float(np.ptp(section.displacement))
     longest = max(2.0 * section.step, min(0.1, 0.1 * section.step * section.displacement.size))
-    spans = [(np.log(2e-3 * half), np.log(0.7 * half)), (np.log(0.2 * section.step), np.log(longest))]
+    spans = [(np.log(RIGID * half), np.log(0.7 * half)), (np.log(0.2 * section.step), np.log(longest))]
     return _grid(section, spans, _GRID)
 
 

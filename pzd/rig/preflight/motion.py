@@ -124,7 +124,10 @@ def resolution(test: PreflightRecord) -> Iterator[Finding]:
 
 
 def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
-    """Find a recorded velocity of another scale, sign or shape than the derivative of the displacement."""
+    """Find a recorded velocity of another scale, sign or shape than the derivative of the displacement.
+
+    Such a velocity is left out of the records of files, so that nothing is computed from it.
+    """
     recorded, derived = test.record.velocity, test.clean.velocity
     if recorded is derived:
         return
@@ -144,7 +147,7 @@ def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
         where=f"the whole record, {where}",
         size=gain if abs(gain - 1.0) > GAIN else rest,
         unit="-",
-        follows=f"{cause}; say columns: {{velocity: ''}} to have it derived",
+        follows=f"{cause}; left out: the speed is derived from the displacement",
     )
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.artefacts import Finding
+from pzd.artefacts import Finding, RecordEntry
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.measures import chance_work, work
 
@@ -104,4 +104,43 @@ def scale(test: PreflightRecord) -> Iterator[Finding]:
             )
 
 
+MIXED = (300.0, 3000.0)
+"""Ratio of a record's force to the usual one of its rig where it stands in another unit by a thousand;"""
+ALIKE_SPEED = 10.0
+"""the r.m.s. speeds differ by less: no damper makes a force of 300 times another's of ten times the speed."""
+
+
+def mixed_units(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """Find records whose force is some thousand times smaller or larger than in the others of a like speed."""
+    return tuple(
+        entry.model_copy(update={"findings": (*entry.findings, *_mixed(entry, [e for e in entries if e is not entry]))})
+        for entry in entries
+    )
+
+
+def _mixed(entry: RecordEntry, others: list[RecordEntry]) -> Iterator[Finding]:
+    mine, speed = entry.force_rms_N, entry.velocity_rms_m_per_s
+    alike = [
+        other.force_rms_N
+        for other in others
+        if other.force_rms_N
+        and other.velocity_rms_m_per_s
+        and speed
+        and 1.0 / ALIKE_SPEED < other.velocity_rms_m_per_s / speed < ALIKE_SPEED
+    ]
+    if not alike or not mine:
+        return
+    usual = float(np.median(alike))
+    ratio = mine / usual
+    if MIXED[0] < max(ratio, 1.0 / ratio) < MIXED[1]:
+        yield Finding(
+            check="scale",
+            where=f"force, r.m.s. {mine:.4g} N, where {usual:.4g} N is usual in the other records at a like speed",
+            size=ratio,
+            unit="-",
+            follows="N and kN are mixed over the files: say units: {force: ...} for each kind in an entry of its own",
+        )
+
+
 CHECKS = (sign, scale)
+COMPARISONS = (mixed_units,)

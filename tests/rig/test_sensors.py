@@ -1,0 +1,263 @@
+"""What sensors and amplifiers do to a record is told with size and place, for dampers of all kinds; else nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from written_files import lines, run, write
+
+from pzd.artefacts import Finding
+from pzd.damper.element import element_force
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.record import Array, Record, conditions, distinct
+from pzd.rig.config import Limits
+from pzd.rig.preflight import PreflightRecord, findings
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
+
+FINE = 8
+"""Steps of the truth between two samples."""
+DRAWS = 15
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A plain damper on a stand, finely in time and without noise."""
+
+    rate: float
+    frequency: float
+    amplitude: float
+    time: Array
+    x: Array
+    force: Array
+    noise: float
+    x_noise: float
+
+    def recorded(
+        self, rng: np.random.Generator, force: Array | None = None, late: float = 0.0, voltage: Array | None = None
+    ) -> Record:
+        """A record of it, with noise; the force late by so many seconds, or another one."""
+        shown = self.force if force is None else force
+        shown = np.interp(self.time - late, self.time, shown)[::FINE]
+        time = self.time[::FINE]
+        x = self.x[::FINE] + self.x_noise * rng.standard_normal(time.size)
+        shown = shown + self.noise * rng.standard_normal(time.size)
+        return Record("a", None, time, x, x, x, shown, voltage)
+
+
+def drawn(rng: np.random.Generator, kind: str = "sine", friction: float | None = None) -> Drawn:
+    """Friction alone to viscous alone, rigid to soft, 200 to 2000 Hz, 0.5 to 4 Hz, 8 to 14 cycles of 4 to 25 mm, noise
+    of the force 0.05 to 1 % and of the displacement up to 5 um.
+    """
+    rate, frequency = float(np.exp(rng.uniform(np.log(200.0), np.log(2000.0)))), rng.uniform(0.5, 4.0)
+    count = int(rng.integers(8, 15) / frequency * rate)
+    time = np.arange(count * FINE) / (rate * FINE)
+    amplitude, phase = rng.uniform(0.004, 0.025), 2.0 * np.pi * frequency * time + rng.uniform(0.0, 2.0 * np.pi)
+    if kind == "sine":
+        x = amplitude * np.sin(phase)
+    elif kind == "triangle":
+        odd = np.arange(1, int(max(60.0 / frequency, 9.0)), 2)
+        x = amplitude * 8.0 / np.pi**2 * sum((-1.0) ** ((k - 1) // 2) / k**2 * np.sin(k * phase) for k in odd)
+    elif kind == "sweep":
+        x = amplitude * np.sin(np.pi * frequency * (time + time**2 / time[-1]))
+    else:
+        x = amplitude * (0.6 * np.sin(phase) + 0.4 * np.sin(2.37 * phase))
+    v = np.gradient(x, time)
+    peak, top = float(np.exp(rng.uniform(np.log(100.0), np.log(4000.0)))), float(np.abs(v).max())
+    share = float(rng.choice([0.0, 1.0, rng.uniform(0.05, 0.95)])) if friction is None else friction
+    extension = float(rng.choice([0.0, np.exp(rng.uniform(np.log(1e-3), np.log(0.15)))]))
+    if extension == 0.0:
+        force = share * peak * np.sign(v) + (1.0 - share) * peak / top * v
+    else:
+        stiffness = peak / (extension * amplitude)
+        viscous = max((1.0 - share) * peak / top, 1e-6 * peak / top)
+        force = element_force(x, float(time[1]), max(share * peak, 1e-6 * peak), viscous, stiffness)
+    noise = peak * float(np.exp(rng.uniform(np.log(5e-4), np.log(0.01))))
+    return Drawn(rate, frequency, amplitude, time, x, force, noise, float(rng.choice([0.0, rng.uniform(0.0, 5e-6)])))
+
+
+def found(one: Record) -> tuple[Finding, ...]:
+    run_of = cycles(one.time, one.displacement)
+    clean = kinematics(one.time, one.displacement, run_of)
+    whole = replace(one, velocity=clean.velocity, acceleration=clean.acceleration)
+    return findings(PreflightRecord(whole, run_of, clean, Limits()))
+
+
+def sizes(records: list[Record], check: str) -> list[Finding]:
+    return [finding for record in records for finding in found(record) if finding.check == check]
+
+
+@pytest.mark.parametrize("kind", ["sine", "triangle", "sweep", "two tones"])
+def test_of_a_plain_record_nothing_is_told(kind: str, rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        assert found(drawn(one, kind).recorded(one)) == ()
+
+
+@pytest.mark.parametrize("steps", [80, 150])
+def test_a_displacement_in_steps_is_told_with_their_size(steps: int, rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        damper = drawn(one)
+        record, step = damper.recorded(one), 2.0 * damper.amplitude / steps
+        (told,) = sizes([replace(record, displacement=step * np.rint(record.displacement / step))], "quantisation")
+        assert told.size == pytest.approx(step, rel=1e-3)
+
+
+def test_fine_steps_are_told_where_the_motion_stands_still_between_them() -> None:
+    time = np.arange(20_000) * 1e-3
+    x = 0.02 * np.sin(2.0 * np.pi * 0.1 * time)
+    force = 80.0 * np.sign(np.cos(2.0 * np.pi * 0.1 * time)) + 0.1 * np.sin(1e3 * time)
+    record = Record("a", None, time, x, x, x, force)
+    (told,) = sizes([replace(record, displacement=5e-5 * np.rint(x / 5e-5))], "quantisation")
+    assert told.size == pytest.approx(5e-5)
+    assert sizes([replace(record, displacement=1e-6 * np.rint(x / 1e-6))], "quantisation") == []
+
+
+@pytest.mark.parametrize("channel", ["force", "displacement"])
+def test_a_channel_that_is_held_is_told_with_its_rate(channel: str, rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        every = int(np.ceil(record.rate / 50.0))
+        values = getattr(record, channel)[np.arange(record.time.size) // every * every]
+        (told,) = [f for f in sizes([replace(record, **{channel: values})], "held") if channel in f.where]
+        assert told.size == pytest.approx(record.rate / every, rel=0.02)
+
+
+@pytest.mark.parametrize(("count", "length"), [(10, 3), (80, 1), (5, 8)])
+def test_drop_outs_to_zero_are_counted(count: int, length: int, rng: np.random.Generator) -> None:
+    told = []
+    for one in rng.spawn(DRAWS):
+        damper = drawn(one)
+        record = damper.recorded(one)
+        if record.time.size < 20 * count * length:
+            continue
+        force = record.force.copy()
+        starts = one.choice(np.arange(10, force.size - 20, 2 * length + 5), count, replace=False)
+        lost = np.unique(starts[:, None] + np.arange(length))
+        force[lost] = 0.0
+        # What is lost where the force passes zero itself is within the noise.
+        seen = np.abs(record.force[lost]) > 0.2 * np.abs(record.force).max()
+        found_here = sizes([replace(record, force=force)], "drop-outs")
+        told.append(len(found_here) == 1 and found_here[0].size * force.size >= 0.7 * np.count_nonzero(seen))
+    assert np.mean(told) >= 0.9
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_control_signal_that_drops_out_stays_one_condition(
+    tmp_path: Path, exact: bool, rng: np.random.Generator
+) -> None:
+    for number, one in enumerate(rng.spawn(6)):
+        damper = drawn(one, friction=0.5)
+        record = damper.recorded(one)
+        noise = 0.002 * one.standard_normal(record.time.size)
+        lost = one.random(record.time.size) < 0.02
+        voltage = np.where(lost, 0.0, 3.0) + (np.where(lost, 0.0, noise) if exact else noise)
+        assert {"drop-outs", "spikes"} & {finding.check for finding in found(replace(record, voltage=voltage))}
+        columns = {"time_s": record.time, "displacement_m": record.displacement, "force_N": record.force}
+        write(tmp_path / f"{number}.csv", lines(columns | {"voltage_V": voltage}))
+    (condition,), moving = conditions(run(tmp_path).records)
+    assert condition.voltage == pytest.approx(3.0, abs=0.01)
+    assert moving == ()
+
+
+@pytest.mark.parametrize("gain", [0.6, 0.92, 1.08])
+def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rng: np.random.Generator) -> None:
+    told = 0
+    for one in rng.spawn(DRAWS):
+        damper = drawn(one)
+        record = damper.recorded(one)
+        half = 0.5 * record.time[-1]
+        force = record.force * np.where(record.time > half, gain, 1.0)
+        for finding in sizes([replace(record, force=force)], "gain"):
+            told += 1
+            assert finding.size == pytest.approx(gain, rel=0.03)
+            about = float(finding.where.split("about ")[1].split(" s")[0])
+            assert about == pytest.approx(half, abs=1.1 / damper.frequency)
+    assert told >= 0.85 * DRAWS
+
+
+def test_a_zero_that_drifts_is_told_with_its_change(rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        damper = drawn(one)
+        record = damper.recorded(one)
+        change = 0.1 * float(np.abs(damper.force).max())
+        force = record.force + change * np.linspace(0.0, 1.0, record.time.size)
+        (told,) = sizes([replace(record, force=force)], "drift")
+        assert told.size == pytest.approx(change, rel=0.15)
+
+
+@pytest.mark.parametrize(("late", "share"), [(0.02, 0.4), (0.05, 0.8), (0.11, 0.8)])
+def test_a_late_force_is_found_up_to_half_a_cycle(late: float, share: float, rng: np.random.Generator) -> None:
+    """On a damper with friction, whose flank comes late; a viscous force that is late is a soft one."""
+    told, tried = [], 0
+    for one in rng.spawn(2 * DRAWS):
+        damper = drawn(one, friction=0.6)
+        if late > 0.35 / damper.frequency:  # then the work is negative, and the file is refused
+            continue
+        tried += 1
+        told += [finding.size for finding in sizes([damper.recorded(one, late=late)], "delay")]
+    assert len(told) >= share * tried
+    # A flank of one sample is smeared over two where cycles are averaged, which passes for a little of a soft spring.
+    assert np.median(told) == pytest.approx(late, rel=0.2)
+    assert min(told) > 0.55 * late
+    assert max(told) < 1.05 * late
+
+
+def test_a_velocity_at_odds_with_the_displacement_is_left_out_of_everything(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    damper = drawn(rng)
+    record = damper.recorded(rng)
+    true = np.gradient(damper.x, damper.time)[::FINE]
+    columns = {"time_s": record.time, "displacement_m": record.displacement, "force_N": record.force}
+    write(tmp_path / "good.csv", lines(columns | {"velocity_m_per_s": true}))
+    write(tmp_path / "bad.csv", lines(columns | {"velocity_m_per_s": -1.5 * true}))
+    rig = run(tmp_path)
+    bad, good = rig.records
+    assert good.velocity == pytest.approx(true, abs=1e-6)
+    assert bad.velocity == pytest.approx(true, abs=0.05 * np.abs(true).max())
+    assert [finding.check for finding in rig.entries[0].findings] == ["velocity"]
+    assert any(row.record == "bad" and row.step == "left out" and row.quantity == "velocity" for row in rig.ingested)
+
+
+def test_copies_of_a_test_are_told_and_count_once(tmp_path: Path, rng: np.random.Generator) -> None:
+    record = drawn(rng, friction=0.5).recorded(rng)
+    columns = {"time_s": record.time, "displacement_m": record.displacement, "force_N": record.force}
+    for name in "abcdef":
+        write(tmp_path / f"{name}.csv", lines(columns))
+    rig = run(tmp_path)
+    assert [one.name for one in rig.records] == list("abcdef")
+    assert [one.name for one in distinct(rig.records)] == ["a"]
+    (told,) = rig.entries[0].findings
+    assert told.check == "copies"
+    assert told.size == 6.0
+    assert told.follows.startswith("b, c, d, e, f: copies")
+    alone, all_six = (
+        identify(IdentifyConfig(), one, 1).parameters[0] for one in (replace(rig, records=rig.records[:1]), rig)
+    )
+    assert found[1].rows == found[0].rows
+
+
+def test_newtons_and_kilonewtons_mixed_over_the_files_are_told(tmp_path: Path, rng: np.random.Generator) -> None:
+    for number, one in enumerate(rng.spawn(4)):
+        record = drawn(one, friction=0.5).recorded(one)
+        force = record.force / np.std(record.force) * (0.8 if number == 2 else 800.0)
+        columns = {"time_s": record.time, "displacement_m": record.displacement, "force_N": force}
+        write(tmp_path / f"{number}.csv", lines(columns))
+    told = {
+        e.name: [f for f in e.findings if f.check == "scale" and "other records" in f.where]
+        for e in run(tmp_path).entries
+    }
+    assert [name for name, ones in told.items() if ones] == ["2"]
+    assert told["2"][0].size == pytest.approx(1e-3)
+
+
+def test_a_condition_with_less_damping_is_no_other_unit(tmp_path: Path, rng: np.random.Generator) -> None:
+    record = drawn(rng, friction=0.5).recorded(rng)
+    for name, factor in (("off", 1.0), ("on", 50.0)):
+        columns = {"time_s": record.time, "displacement_m": record.displacement, "force_N": factor * record.force}
+        write(tmp_path / f"{name}.csv", lines(columns))
+    assert not [f for e in run(tmp_path).entries for f in e.findings if "other records" in f.where]
