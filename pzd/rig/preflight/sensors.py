@@ -29,18 +29,24 @@ COARSE = 200.0
 def quantisation(test: PreflightRecord) -> Iterator[Finding]:
     """Find a displacement that stands still between coarse steps."""
     x = test.record.displacement
-    step = _grid(x)
-    stroke = float(np.ptp(x))
-    if step is None or stroke > (FEWEST_STEPS if _samples_a_step(x) >= DWELL else COARSE) * step:
+    step = coarse_step(x)
+    if step is None:
         return
     yield Finding(
         check="quantisation",
-        where=f"displacement, in {stroke / step:.0f} steps over the stroke",
+        where=f"displacement, in {np.ptp(x) / step:.0f} steps over the stroke",
         size=step,
         unit="m",
         follows="between two steps the motion is guessed: where the rod turns is known to a step, and the speed by it; "
         "T0, C and k may be off by more than their intervals: record it with finer steps",
     )
+
+
+def coarse_step(x: Array) -> float | None:
+    """Return the step [m] of a displacement (n,) that stands still between coarse steps; None where it does not."""
+    step = _grid(x)
+    fewest = FEWEST_STEPS if _samples_a_step(x) >= DWELL else COARSE
+    return None if step is None or float(np.ptp(x)) > fewest * step else step
 
 
 def _grid(values: Array) -> float | None:
