@@ -63,8 +63,8 @@ class KneeRow(ConditionRow):
     friction_N_low95: float
     friction_N_high95: float
     gas_force_N: float
-    """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out. 0 where the tests show
-    none: then all else is fitted without it."""
+    """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out. 0 where no test shows
+    one: then all else is fitted without it."""
     gas_force_N_low95: float
     gas_force_N_high95: float
     gas_spring_N_per_m: float

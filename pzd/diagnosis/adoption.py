@@ -27,11 +27,12 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, refit, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
+from pzd.diagnosis.search.determination import first_undetermined, showing, undetermined
 from pzd.record import Array
 from pzd.signals.measures import rms
 
@@ -84,7 +85,7 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
     unit : of the control signal, for the reason
     """
     baseline, reference = validation.baseline_error(), validation.baseline_interpolation_error
-    kept, rejection = _without_impossible(selection, forced)
+    kept, rejection = _without_impossible(_without_undetermined(selection, forced), forced)
     while kept.adopted:
         error, by_criterion = _better_predicting_fit(kept, validation)
         between = validation.interpolation_error(kept.fitted.damper, by_criterion=by_criterion)
@@ -102,11 +103,22 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
             if found is not None:
                 evidence = replace(kept.final_evidence, whole=found[0])
                 kept = replace(kept, fitted=found[1], final_evidence=evidence)
+                if none := first_undetermined(evidence.whole, kept.fitted, forced):
+                    kept = _without_effect(kept, *none)
+                    continue
             return Adoption(kept, baseline, error, between, by_criterion=by_criterion)
         if worse and len(kept.adopted) == 1:
             rejection = _rejection_reason(selection, f"{kind} are predicted", compared, validation, worse, unit)
         kept = _without_effect(kept, harmful)
     return Adoption(kept, baseline, baseline, reference, rejection)
+
+
+def _without_undetermined(selection: Selection, forced: Sequence[str]) -> Selection:
+    """Remove effects that the fit does not determine, one at a time, each time with the rest fitted again."""
+    kept = selection
+    while kept.adopted and (none := first_undetermined(kept.final_evidence.whole, kept.fitted, forced)):
+        kept = _without_effect(kept, *none)
+    return kept
 
 
 def _without_impossible(selection: Selection, forced: Sequence[str]) -> tuple[Selection, str | None]:
@@ -313,7 +325,8 @@ def _possible_additions(current: _CriterionFit, config: DiagnoseConfig, adopted:
         for effect in most_promising(problem, fitted, new, thresholds.SCREENED_EFFECTS):
             own = problem.with_friction_scaling(effect)
             found.append(replace(candidate(own, fitted, effect), varies=own is not problem))
-    return (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
+    visible = (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
+    return (c for c in visible if c.effect not in undetermined(problem, c.fitted))
 
 
 def _improves(one: PredictionError, other: PredictionError, validation: CrossValidation) -> bool:
@@ -328,7 +341,7 @@ def _without_replaced(current: _CriterionFit, validation: CrossValidation, force
     """Remove effects that the data do not determine beside the others, and that the prediction does not need."""
     while True:
         fewer = []
-        for name in _undetermined(current.fitted):
+        for name in _removable(current.fitted):
             if name in forced:
                 continue
             damper = current.fitted.damper.without_effects(name)
@@ -345,20 +358,10 @@ def _without_replaced(current: _CriterionFit, validation: CrossValidation, force
         current = _CriterionFit(problem, fitted, error, between)
 
 
-def _undetermined(fitted: FitResult) -> list[str]:
-    """Return the effects that may as well be off, or have impossible values.
-
-    May be off: the 95 % interval of the strength, the first parameter, holds its neutral value.
-    """
-    strengths = {name: library()[name].parameters[0] for name in fitted.effects}
-    unknowns = zip(fitted.unknowns, LEVEL * standard_errors(fitted), strict=True)
-    known = {
-        u.effect
-        for u, error in unknowns
-        if u.parameter == strengths.get(u.effect) and not abs(u.value_in(fitted.damper) - u.parameter.neutral) <= error
-    }
-    odd = against_nature(fitted.damper)
-    return [name for name in fitted.effects if (name not in known or name in odd) and len(fitted.effects) > 1]
+def _removable(fitted: FitResult) -> list[str]:
+    """Return the effects whose strength may as well be zero, or with impossible values."""
+    shown, odd = showing(fitted), against_nature(fitted.damper)
+    return [name for name in fitted.effects if (name not in shown or name in odd) and len(fitted.effects) > 1]
 
 
 # --- Check of the force half-way between two tested voltages

@@ -284,8 +284,13 @@ class CrossValidation(Folds):
         return None if problem is None else (problem, refit(problem, damper))
 
     def worse_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
-        """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it."""
-        return self._voltages_where(predicts_worse, one, other)
+        """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it.
+
+        Beyond chance at one of them; over all tests a visible loss is enough, chance or not: what is handed on never
+        predicts worse.
+        """
+        found = self._voltages_where(predicts_worse, one, other)
+        return found or (self.voltages if other.visibly_below(one) else ())
 
     def better_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
         """Return the voltages [V] at which one damper predicts better; all where only the whole shows it."""

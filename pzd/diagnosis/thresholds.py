@@ -132,6 +132,19 @@ Reason: there the line between voltages misses more than any law, and with a tru
 damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the same, tell chance. 7
 % more was seen with a true name, 2.9 times with a wrong one; not tuned."""
 
+NEAR_LIMIT = 0.1
+"""Distance from a limit of the search, in standard errors, within which a parameter ends at it.
+
+Reason: so near, the tests do not tell the value from the limit; not tuned."""
+NEAREST_LIMIT = 1e-3
+"""Distance from a limit of the search that counts as at it whatever the error.
+
+Reason: a thousandth of the scale of a parameter, or of its ratio; a search stays inside its limits. Not tuned."""
+CANCELLED_SHARE = 0.1
+"""Share of the smaller of two forces below which their sum counts as cancelled.
+
+Reason: an error of a tenth in either is then as large as what both do together; not tuned."""
+
 # --- When an effect is added for its prediction alone (adoption.py)
 
 LEAST_PREDICTION_GAIN = 0.05

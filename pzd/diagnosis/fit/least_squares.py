@@ -249,7 +249,7 @@ def standard_errors(fitted: FitResult) -> Array:
     of_effects = slice(fitted.optimum.size - len(fitted.unknowns), fitted.optimum.size)
     searched = fitted.optimum[of_effects]
     slopes = np.array([u.derivative(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
-    return np.asarray(np.abs(slopes) * _search_errors(fitted, of_effects))
+    return np.asarray(np.abs(slopes) * search_errors(fitted, of_effects))
 
 
 def base_half_widths(fitted: FitResult, coordinates: ElementCoordinates) -> Array:
@@ -264,11 +264,11 @@ def base_half_widths(fitted: FitResult, coordinates: ElementCoordinates) -> Arra
     """
     of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
     units = np.array([coordinates.slopes(row) for row in fitted.optimum[of_base].reshape(-1, 3)])
-    return np.asarray(LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units)
+    return np.asarray(LEVEL * search_errors(fitted, of_base).reshape(-1, 3) * units)
 
 
-def _search_errors(fitted: FitResult, of: slice) -> Array:
-    """Compute the standard errors of some search variables."""
+def search_errors(fitted: FitResult, of: slice) -> Array:
+    """Compute the standard errors of some variables in the units of the search; see `standard_errors`."""
     freedom = max(fitted.size - fitted.optimum.size, 1)
     wider = np.maximum(disagreement(fitted, of), max(1.0, fitted.misfit / freedom))
     return np.asarray(np.sqrt(np.diag(fitted.covariance)[of] * wider))

@@ -92,11 +92,11 @@ class Unknown:
     @property
     def bounds(self) -> tuple[float, float]:
         """Limits of the search variable."""
-        low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
+        least, most = self.parameter.search.within
+        low, high = max(self.parameter.low / self.scale, least), min(self.parameter.high / self.scale, most)
         if self.parameter.search.logarithmic:
             return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
-        least, most = self.parameter.search.within
-        return max(low, least, -BOUND), min(high, most, BOUND)
+        return max(low, -BOUND), min(high, BOUND)
 
     def value(self, searched: float) -> float:
         """Return the parameter in its own unit at a value of the search variable."""

@@ -20,6 +20,7 @@ from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, starts_of, towards_neutral
+from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
 from pzd.record import Array
 
 WITHIN_TEST_SCATTER = "so small that it counts as an offset or a delay of the tests"
@@ -33,11 +34,17 @@ def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: 
         return "does not pay"
     if candidate.explained < config.visible:
         return f"moves the force by less than {100 * config.visible:g} % of peak"
-    if small := trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
-        return small
-    if candidate.effect == "end_stop":
-        return misplaced_end_stop(candidate.fitted.damper, evidence.whole.scales.stroke)
-    return None
+    scales = evidence.whole.scales
+    return trivial(candidate.fitted, candidate.effect, scales.low_force) or _misplaced(candidate, scales.stroke)
+
+
+def _misplaced(candidate: Candidate, stroke: float) -> str | None:
+    """Say why the values of a candidate are those of no such effect; `stroke` is half of the whole one [m]."""
+    if candidate.effect == "relief_valve" and opens_below_friction(candidate.fitted.damper):
+        return ANOTHER_DAMPING
+    if candidate.effect in at_limits(candidate.fitted):
+        return AT_LIMIT
+    return misplaced_end_stop(candidate.fitted.damper, stroke) if candidate.effect == "end_stop" else None
 
 
 def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
@@ -120,12 +127,19 @@ def spurious(
     fits = [least_squares.refit(half, candidate.fitted.damper) for half in halves]
     without = least_squares.fit(evidence.halves[0], before.effects, before.optimum)
     left = least_squares.profiled_misfit(evidence.validation_problem(weighed), without.damper)
-    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + config.rival_bic:
+    # Where more than noise is left, all misfits are larger in proportion, and their differences by chance as well.
+    chance = config.rival_bic * max(_spread(fitted) for fitted in fits)
+    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + chance:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
     if not _halves_agree(halves, (fits[0], fits[1]), fresh, thresholds.HALVES_LOSS * -candidate.delta_bic):
         return "stand-in: takes other values on either half of the tests"
     return None
+
+
+def _spread(fitted: FitResult) -> float:
+    """Return the mean square residual of a fit in units of noise, at least one."""
+    return max(1.0, fitted.misfit / max(fitted.size - fitted.optimum.size, 1))
 
 
 def _halves_agree(
@@ -151,8 +165,7 @@ def _halves_agree(
         return True
     limit = 2.0 * float(chdtri(len(fits[0].unknowns), thresholds.HALVES_SIGNIFICANCE))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
-        spread = max(1.0, own.misfit / max(own.size - own.optimum.size, 1))
-        if least_squares.profiled_misfit(half, other.damper) - own.misfit <= max(limit * spread, negligible):
+        if least_squares.profiled_misfit(half, other.damper) - own.misfit <= max(limit * _spread(own), negligible):
             return True
     return False
 
@@ -245,7 +258,7 @@ def detection_from_fit(candidate: Candidate, force: float, gap: float | None = N
     if not candidate.searched or min(candidate.misfit_drop, candidate.residual_change, size) <= 0.0:
         return ()
     fitted = candidate.fitted
-    spread = max(1.0, fitted.misfit / max(fitted.size - fitted.optimum.size, 1))
+    spread = _spread(fitted)
     shape = sum(u.effect == candidate.effect for u in fitted.unknowns) - 1
     error = size / float(np.sqrt(candidate.residual_change / spread))
     relevant_from = _smallest_relevant_gap(fitted.damper, candidate.effect, force, size)
@@ -296,7 +309,7 @@ class _TangentSpace:
         trace : its values in the units of the search, so small that the force is linear in them
         """
         problem, before = self.problem, self.before
-        spread = max(1.0, before.misfit / max(before.size - before.optimum.size, 1))
+        spread = _spread(before)
         unknowns = problem.unknowns((*before.effects, effect.name))
         damper = problem.point(np.concatenate([before.optimum, trace]), unknowns).damper
         if effect.name in against_nature(damper):

@@ -1,0 +1,112 @@
+"""Which effects of a fit are none: off as well, at a limit, cancelled by another, or another form of T0 and C.
+
+Such an effect may lower the misfit all the same. Outside the tests it does anything: a stop that begins just beyond the
+stroke, two forces of kilonewtons that cancel within it. So it is neither adopted nor handed on, and the rest is fitted
+again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+from pzd.diagnosis import thresholds
+from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, search_errors, standard_errors
+from pzd.diagnosis.fit.likelihood import simulated_force
+from pzd.diagnosis.fit.problem import ZERO, Problem
+from pzd.record import Array
+from pzd.signals.measures import rms
+
+MAY_BE_OFF = "stand-in: its strength may as well be zero"
+AT_LIMIT = "stand-in: ends at a limit, beyond which it would fit better still"
+CANCELLED = "stand-in: cancels another effect, and neither is known by itself"
+ANOTHER_DAMPING = "stand-in: opens below T0, where it is another C"
+
+
+def undetermined(problem: Problem, fitted: FitResult) -> dict[str, str]:
+    """Return the effects of a fit that are none, each with the reason.
+
+    Parameters
+    ----------
+    problem : observations and limits of the fit
+    fitted : its optimum
+    """
+    shown = showing(fitted)
+    found = {name: MAY_BE_OFF for name in fitted.effects if name not in shown}
+    found |= {name: AT_LIMIT for name in at_limits(fitted) if name not in found}
+    if opens_below_friction(fitted.damper):
+        found["relief_valve"] = ANOTHER_DAMPING
+    return found | {name: CANCELLED for pair in cancelling(problem, fitted) for name in pair if name not in found}
+
+
+def showing(fitted: FitResult) -> set[str]:
+    """Return the effects that are not off: the 95 % interval of the strength, the first parameter, excludes that value.
+
+    One whose parameters differ by voltage shows where that of any voltage does.
+    """
+    strengths = {name: library()[name].parameters[0] for name in fitted.effects if name in library()}
+    unknowns = zip(fitted.unknowns, LEVEL * standard_errors(fitted), strict=True)
+    return {
+        u.effect
+        for u, error in unknowns
+        if u.parameter == strengths.get(u.effect) and not abs(u.value_in(fitted.damper) - u.parameter.neutral) <= error
+    }
+
+
+def at_limits(fitted: FitResult) -> Iterator[str]:
+    """Yield the effects of which some parameter ends at a limit of the search, at every voltage that it has."""
+    split = fitted.optimum.size - len(fitted.unknowns)
+    errors = search_errors(fitted, slice(split, fitted.optimum.size))
+    ends: dict[tuple[str, str], list[bool]] = {}
+    for u, x, error in zip(fitted.unknowns, fitted.optimum[split:], errors, strict=True):
+        if u.parameter is not ZERO:
+            near = max(thresholds.NEAR_LIMIT * float(error), thresholds.NEAREST_LIMIT)
+            beside = min(float(x) - u.bounds[0], u.bounds[1] - float(x)) <= near
+            ends.setdefault((u.effect, u.parameter.name), []).append(beside)
+    yield from dict.fromkeys(effect for (effect, _), each in ends.items() if all(each))
+
+
+def opens_below_friction(damper: Damper) -> bool:
+    """Whether a relief valve opens below T0 at every row: C then never acts, and C_r is another C."""
+    if "relief_valve" not in damper.effects:
+        return False
+    values = damper.effects["relief_valve"]
+    nodes, opens = np.atleast_1d(values.get("at_voltage_V", 0.0)), np.atleast_1d(values["F_r"])
+    return all(float(np.interp(row.voltage_V or 0.0, nodes, opens)) <= row.T0_N for row in damper.base)
+
+
+def cancelling(problem: Problem, fitted: FitResult) -> Iterator[tuple[str, str]]:
+    """Yield the pairs of effects whose forces cancel over the tests but for a small part of either.
+
+    Equation: rms(d_i + d_j) < s min(rms d_i, rms d_j), d_i = F - F without effect i
+    """
+    if len(fitted.effects) < 2:
+        return
+    whole = _forces(problem, fitted.damper)
+    moved = {name: whole - _forces(problem, fitted.damper.without_effects(name)) for name in fitted.effects}
+    for one, other in combinations(fitted.effects, 2):
+        least = min(rms(moved[one]), rms(moved[other]))
+        if rms(moved[one] + moved[other]) < thresholds.CANCELLED_SHARE * least:
+            yield one, other
+
+
+def _forces(problem: Problem, damper: Damper) -> Array:
+    """Simulate the compared samples (n,) of every record, each in units of its peak."""
+    return np.concatenate([simulated_force(o, damper) / o.peak for o in problem.observations])
+
+
+def first_undetermined(problem: Problem, fitted: FitResult, kept: Sequence[str]) -> tuple[str, str] | None:
+    """Return the last adopted of the effects that are none, and why; None where the fit determines all.
+
+    Parameters
+    ----------
+    problem : observations and limits of the fit
+    fitted : its optimum
+    kept : effects that stay whatever they do
+    """
+    found = undetermined(problem, fitted)
+    return next(((name, found[name]) for name in reversed(fitted.effects) if name in found and name not in kept), None)
