@@ -54,9 +54,9 @@ class SummaryRow(Frozen):
     """R.m.s. of the dynamic wheel load, the larger of the two axles."""
     dissipated_J: float
     energy_error: float
-    """Of the whole ride."""
+    """Of the whole ride, as a share of the energy that flows."""
     outside_table: float
-    """Share of the whole ride spent beyond what the rig reached."""
+    """Share of the whole ride in which a damper moves faster, or farther from the middle, than the rig did."""
 
 
 class RideRow(Frozen):

@@ -90,6 +90,8 @@ class TableNotes(Frozen):
     """What the table does beyond the rig's speeds."""
     reached_m_per_s: float
     """The largest speed that the rig reached."""
+    reached_stroke_m: float | None = None
+    """The farthest that a test of the setting went from the middle of the stroke; an earlier version has none."""
     lost: tuple[str, ...]
     """What a table of force over voltage and velocity cannot carry, in words."""
     not_monotone: tuple[str, ...]

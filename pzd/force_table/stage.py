@@ -13,7 +13,7 @@ from pzd.artefacts import Diagnosed, Identified, Rig, Table, TableNotes
 from pzd.damper.model import Damper
 from pzd.force_table.config import TableConfig
 from pzd.quantities import Control
-from pzd.record import Record
+from pzd.record import Record, mid_stroke
 
 if TYPE_CHECKING:
     from pzd.force_table.force import OperatingEnvelope
@@ -98,6 +98,7 @@ def _within(
     notes = TableNotes(
         outside=table.outside,
         reached_m_per_s=float(np.nanmax(envelope.speeds)),
+        reached_stroke_m=_reached_stroke(records),
         lost=force.lost(damper, nodes.temperatures, nodes.velocities),
         not_monotone=force.not_monotone(damper, nodes.temperatures, nodes.velocities, control),
     )
@@ -105,6 +106,12 @@ def _within(
         log.info("table: %s", line)
     forward = Table(force.force_rows(table, damper, nodes, envelope), (), notes)
     return replace(forward, inverse=lookup.inverse_rows(table, forward))
+
+
+def _reached_stroke(records: Sequence[Record]) -> float:
+    """Return the farthest that a record goes from the middle of the stroke of all [m]."""
+    middle = mid_stroke(record.displacement for record in records)
+    return max(float(np.max(np.abs(record.displacement - middle))) for record in records)
 
 
 def _temperatures(table: TableConfig, damper: Damper, records: Sequence[Record]) -> tuple[float | None, ...]:

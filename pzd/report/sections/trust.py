@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from pzd.artefacts import ENERGY_LIMIT, ParameterRow, ReferenceRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
+from pzd.damper.confounders import known
+from pzd.damper.effect import Effect
 from pzd.report import tables
 from pzd.report.blocks import Block, Notes, Paragraph, Section, amount, number, percent
 from pzd.report.columns import Column, Quantity, Table
@@ -72,6 +74,28 @@ def render(context: ReportContext) -> Section:
     return Section("trust", "How far to trust it", tuple(blocks))
 
 
+def _beyond_stroke(context: ReportContext) -> Iterator[str]:
+    """Say which rides go farther than any test did, and which adopted effects depend on that."""
+    tested, ratio = context.table.notes.reached_stroke_m, max(context.simulate.car.car().motion_ratios)
+    with_damper = [row for row in context.rides.summary if row.fidelity != "ideal"]
+    beyond = [row for row in with_damper if tested is not None and ratio * row.peak_deflection_m > tested]
+    if tested is None or not beyond:
+        return
+    worst = max(beyond, key=lambda row: row.peak_deflection_m)
+    of_stroke = [name for name in context.diagnosed.damper.effects if _goes_with_displacement(known()[name])]
+    does = f"; there no test shows what {' and '.join(of_stroke)} does" if of_stroke else ""
+    yield (
+        f"{len(beyond)} rides go farther than any test did ({number(tested)} m from the middle of the stroke), "
+        f"{worst.case} to {number(ratio * worst.peak_deflection_m)} m{does}"
+    )
+
+
+def _goes_with_displacement(effect: Effect) -> bool:
+    """Whether a force beside the element goes with the displacement: some parameter has a length, and none a time."""
+    lengths = {"m", "N/m", "N/m2", "N/m3"}
+    return effect.place == "parallel" and any(parameter.unit in lengths for parameter in effect.parameters)
+
+
 def _cares(context: ReportContext) -> Iterator[str]:
     weak = [
         row
@@ -100,6 +124,7 @@ def _cares(context: ReportContext) -> Iterator[str]:
             f"{worst.case} for {percent(worst.outside_table)} of its time: "
             f"{does[context.table.notes.outside]}, untested"
         )
+    yield from _beyond_stroke(context)
     pulling = [row for row in context.rides.wheels if row.pulling > _MUCH]
     if pulling:
         axle = min(pulling, key=lambda row: row.min_contact_force_N)

@@ -25,6 +25,7 @@ from pzd.simulate.ride.model import (
     inertance,
     parallel_at,
     remember,
+    rigid_force,
     rubbing_force,
     slipping_forces,
 )
@@ -189,15 +190,19 @@ def dynamic_forces(time: float, y: Array, ride: RunningRide) -> None:
         ratio, n = car.ratio[i], car.dampers[i]
         voltage = valve_voltage(time, ride, i)
         row = row_at(damper.voltages, damper.rows, voltage)
-        e = ratio * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
-        workspace[Axle.OIL_DEFLECTION, i] = e
-        workspace[Axle.OIL_FORCE, i], workspace[Axle.FLOW, i] = flowing(e, row, abs(workspace[Axle.FLOW, i]))
-        if damper.alone:
-            workspace[Axle.FORCE, i] = n * ratio * workspace[Axle.OIL_FORCE, i]
-            continue
         speed = workspace[Axle.RATE, i]
         if model.control_spec.jumps and control[Command.SIDE, i] != 0.0:
             speed = one_sided(speed, control[Command.SIDE, i])
+        if damper.rigid:
+            workspace[Axle.OIL_FORCE, i] = rigid_force(ratio * speed, row)
+            workspace[Axle.FLOW, i] = ratio * workspace[Axle.RATE, i]
+        else:
+            e = ratio * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
+            workspace[Axle.OIL_DEFLECTION, i] = e
+            workspace[Axle.OIL_FORCE, i], workspace[Axle.FLOW, i] = flowing(e, row, abs(workspace[Axle.FLOW, i]))
+        if damper.alone:
+            workspace[Axle.FORCE, i] = n * ratio * workspace[Axle.OIL_FORCE, i]
+            continue
         parallel = damper.scratch
         parallel_at(damper, voltage, parallel)
         workspace[Axle.ELASTIC, i] = elastic_force(ratio * workspace[Axle.DEFLECTION, i], parallel)
@@ -358,7 +363,7 @@ def oil_energy(time: float, y: Array, ride: RunningRide) -> float:
     """
     model, workspace = ride.model, ride.workspace
     car, damper, energy = model.car, model.damper, 0.0
-    if model.control_spec.fidelity != DYNAMIC:
+    if model.control_spec.fidelity != DYNAMIC or damper.rigid:
         return energy
     suspension(time, y, car, model.road_coefficients, workspace)
     for i in range(2):
@@ -368,16 +373,18 @@ def oil_energy(time: float, y: Array, ride: RunningRide) -> float:
     return energy
 
 
-def balance_error(change: float, oil_change: float, y: Array) -> float:
-    """Return what the energy balance leaves open, as a share of the dissipated energy.
+def balance_error(change: float, oil_change: float, y: Array, flowed: float = 0.0) -> float:
+    """Return what the energy balance leaves open, as a share of the energy that flows.
 
-    Equation: (change of stored energy + put into the oil + dissipated - road work) / dissipated, in dampers and tyres
+    Equation: (change of stored energy + put into the oil + dissipated - road work) / max(dissipated, flowed); it is
+    dissipated in dampers and tyres
 
     Parameters
     ----------
     change : of the stored energy over the ride [J], see `stored_energy`
     oil_change : of what the oil stiffnesses store [J], where no voltage moved; else what was put into them
     y : (n,) state at its end; the work on what stands beside the elements counts as stored
+    flowed : what the road gave and took, in magnitude [J]: where nothing damps it all comes back
 
     Returns
     -------
@@ -385,4 +392,4 @@ def balance_error(change: float, oil_change: float, y: Array) -> float:
     """
     lost = y[State.DISSIPATED] + (y[State.TYRE_LOSS] if y.size > State.TYRE_LOSS else 0.0)
     left = change + oil_change + y[State.PARALLEL_WORK] + lost - y[State.ROAD_WORK]
-    return float(left / max(lost, _NOTHING)) if abs(left) > _NOTHING else 0.0
+    return float(left / max(lost, flowed, _NOTHING)) if abs(left) > _NOTHING else 0.0

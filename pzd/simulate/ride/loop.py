@@ -165,7 +165,7 @@ where the wheels have no mass, larger deflection of the two suspensions [m], ene
 COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
-OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
+OUTSIDE, STEPS_DONE, NEXT_PIECE, FLOWED = range(4)
 """Places in `Records.tally`."""
 
 
@@ -190,17 +190,21 @@ class Records(NamedTuple):
     history: Array
     """(m, COLUMNS) of every step that is a multiple of `Clock.per_output`."""
     tally: Array
-    """(3,) steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
+    """(4,) steps beyond what the rig reached, steps done, length of the piece of a step to try next [s], and the work
+    of the road in magnitude, step by step [J]."""
 
 
 def records_of(rows: int, per_output: int) -> Records:
     """Return empty records for pieces of so many steps."""
-    return Records(np.zeros((rows, COURSE_COLUMNS)), np.zeros((-(-rows // per_output), COLUMNS)), np.zeros(3))
+    return Records(np.zeros((rows, COURSE_COLUMNS)), np.zeros((-(-rows // per_output), COLUMNS)), np.zeros(4))
 
 
 @inlined
 def beyond_reach(ride: RunningRide) -> bool:
-    """Tell whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
+    """Tell whether a damper moves faster than the rig did at its voltage, or farther than it did in any test.
+
+    `ideal` has no damper: there the fastest at any voltage counts, and no stroke.
+    """
     model, control, workspace = ride
     grid, car = model.grid, model.car
     last = grid.reach.size - 1
@@ -211,6 +215,9 @@ def beyond_reach(ride: RunningRide) -> bool:
             for n in range(last + 1):
                 reach = max(reach, grid.reach[n])
         if abs(car.ratio[i] * workspace[Axle.RATE, i]) > reach * (1.0 + 1e-9):
+            return True
+        stroke = abs(car.ratio[i] * workspace[Axle.DEFLECTION, i])
+        if model.control_spec.fidelity != IDEAL and stroke > grid.stroke * (1.0 + 1e-9):
             return True
     return False
 
@@ -277,6 +284,7 @@ def ride_steps(
         tally[STEPS_DONE] = n
         if math.isnan(workspace[Axle.COMFORT, 0]):
             return
+        tally[FLOWED] += h * abs(integrator.stages[0, State.ROAD_WORK])
         if beyond_reach(ride):
             tally[OUTSIDE] += 1.0
         if n % clock.per_output == 0:

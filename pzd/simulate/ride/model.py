@@ -12,6 +12,7 @@ from pzd.artefacts import Table
 from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.columns import DRIVE, acting
 from pzd.damper.compiled.kernels import (
+    T0,
     C,
     K,
     Row,
@@ -22,7 +23,8 @@ from pzd.damper.compiled.kernels import (
     parallel_force,
 )
 from pzd.damper.compose import BRANCHES, any_slips, steady_force
-from pzd.damper.flow import flow_speed
+from pzd.damper.confounders import known
+from pzd.damper.flow import breakaway, flow_force, flow_speed
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import nodes_of
 from pzd.damper.regimes import spring_force
@@ -233,6 +235,8 @@ class TableArrays(NamedTuple):
     """(m, n) force of one damper in compression [N]."""
     reach: Array
     """(m,) fastest speed of the rig at each voltage [m/s]."""
+    stroke: float
+    """Farthest that a test of the rig went from the middle of the stroke [m]; infinite where that is not known."""
 
 
 class ControlSpec(NamedTuple):
@@ -362,6 +366,9 @@ class DynamicDamper(NamedTuple):
     memory: Array
     """(2, 1 + b) of one damper at each axle: the extension at the last step of integration, and what each of the b
     branches was deflected by there [m]."""
+    rigid: bool
+    """Whether the oil is so stiff that the flow has the speed of the rod: F = T0 sign(v) + C v, any force up to T0 at
+    rest."""
 
 
 @inlined
@@ -409,6 +416,16 @@ def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
     force = spring_force(e, row)
     side = 1.0 if force >= 0.0 else -1.0
     return force, side * flow_speed(abs(force), row, side, guess)
+
+
+@inlined
+def rigid_force(v: float, row: Row) -> float:
+    """Return the force of a rigid element [N] at a speed of the rod [m/s]; the sign bit of 0 picks the side.
+
+    Equation: F = sign(v) flow curve (|v|)              Source: eq. (1) to (3) as k goes to infinity
+    """
+    side = math.copysign(1.0, v)
+    return side * flow_force(abs(v), row, side)
 
 
 @inlined
@@ -462,13 +479,31 @@ def remember(damper: DynamicDamper, axle: int, x: float, row: Array) -> None:
 # --- Table and damper as arrays ---
 
 LEAST_RELAXATION = 1e-5
-"""An oil stiffness that relaxes faster than this [s] is rigid for a car, and is taken as this fast."""
+"""Relaxation C/k [s] down to which the flow of the oil is integrated.
+
+Reason: a hundredth of a step. Where it is faster the oil is rigid, or all but plastic: see `dynamic_damper_of`."""
+LEAST_PLASTIC_RELAXATION = 1e-6
+"""Relaxation of an oil that is soft and hardly damps [s]: C is raised to this times k.
+
+Reason: at 1 m/s it adds a deflection of 1 um, or a hundredth of the friction where `RIGID_DEFLECTION` begins."""
+RIGID_DEFLECTION = 1e-4
+"""Deflection of the oil under the dry friction [m] up to which it counts as none.
+
+Reason: below the play of the bushes that a damper hangs in."""
 
 
 def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """Return the table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
-    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.envelope)
+    stroke = table.notes.reached_stroke_m
+    return TableArrays(
+        lookup.voltages,
+        lookup.speeds,
+        lookup.rebound,
+        lookup.compression,
+        lookup.envelope,
+        math.inf if stroke is None else stroke,
+    )
 
 
 def table_of(damper: Damper, table: Table) -> Table:
@@ -504,6 +539,10 @@ def table_of(damper: Damper, table: Table) -> Table:
 def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -> DynamicDamper:
     """Return the damper at one temperature, as the compiled loop reads it.
 
+    An oil that relaxes faster than `LEAST_RELAXATION` at every node has a form of its own. It is rigid where the
+    friction deflects it by less than `RIGID_DEFLECTION` and no effect acts on its stroke. Else it is soft and hardly
+    damps, and C is raised to what can be integrated.
+
     Parameters
     ----------
     damper : with its effects
@@ -512,7 +551,13 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     """
     nodes = nodes_of(damper, temperature)
     rows = np.array(nodes.rows)
-    rows[:, K] = np.minimum(rows[:, K], rows[:, C] / LEAST_RELAXATION)
+    fast = rows[:, C] < LEAST_RELAXATION * rows[:, K]
+    stiff = rows[:, T0] <= RIGID_DEFLECTION * rows[:, K]
+    rigid = bool(np.all(fast & stiff)) and all(known()[name].place != "stroke" for name in damper.effects)
+    # The plant of the predictive control keeps an oil spring, as stiff as its step resolves.
+    capped = np.minimum(rows[:, K], np.maximum(rows[:, C], 1.0) / LEAST_RELAXATION)
+    rows[:, K] = np.where(fast & stiff, capped, rows[:, K])
+    rows[:, C] = np.maximum(rows[:, C], LEAST_PLASTIC_RELAXATION * rows[:, K])
     drive = np.array(nodes.drive)
     if "valve_lag" not in damper.effects:
         drive[DRIVE.index(("valve_lag", "tau"))] = valve
@@ -520,12 +565,14 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     remembers = any_slips(parallel)
     alone = not (remembers or any(_is_parallel(row) for row in parallel))
     scratch, memory = np.zeros(parallel.shape[1]), np.zeros((2, 1 + BRANCHES))
-    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, scratch, remembers, memory)
+    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, scratch, remembers, memory, rigid)
 
 
 def rubs(dynamic: DynamicDamper) -> bool:
-    """Tell whether friction beside the element jumps where the speed crosses zero."""
+    """Tell whether friction beside the element, or that of a rigid one, jumps where the speed crosses zero."""
     tiny = np.finfo(np.float64).tiny
+    if dynamic.rigid and any(breakaway(row, side) > 0.0 for row in dynamic.rows for side in (1.0, -1.0)):
+        return True
     return any(parallel_force(0.0, tiny, 0.0, row) != parallel_force(0.0, 0.0, 0.0, row) for row in dynamic.parallel)
 
 

@@ -17,7 +17,7 @@ from pzd.simulate.control.sensing import electronics_of, with_noise
 from pzd.simulate.policies import SENSED
 from pzd.simulate.ride.equations import balance_error, oil_energy, relax_oil, stored_energy
 from pzd.simulate.ride.linear import ride_exactly
-from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride_steps
+from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, FLOWED, OUTSIDE, STEPS_DONE, Clock, records_of, ride_steps
 from pzd.simulate.ride.model import (
     AIMS,
     BY_COEFFICIENTS,
@@ -193,7 +193,7 @@ def ride_case(
         course=records.course if sink is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
         outside=float(records.tally[OUTSIDE] / count),
-        energy_error=balance_error(change, oil_change, y),
+        energy_error=balance_error(change, oil_change, y, float(records.tally[FLOWED])),
     )
 
 
