@@ -19,15 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.element import element_force, element_force_sensitivities
-from pzd.fit.element_coordinates import LARGEST, ElementCoordinates
+from pzd.fit.element_coordinates import LARGEST, LARGEST_PRE_SLIP, ElementCoordinates
 from pzd.identification.config import EvolutionaryConfig
 from pzd.identification.prepared_record import PreparedRecord
 from pzd.record import Array
 
 # --- Criterion and search coordinates ---
 
-LARGEST_PRE_SLIP = 0.45
-"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement: the element still slips."""
 AT_LIMIT = 1e-6
 """A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much of
 what no test shows."""
@@ -138,7 +136,7 @@ class Objective:
         """Tell whether each parameter lies at a bound of the search; the limits of the law are results."""
         x, high = self.coordinates.to_search(*parameters), self.coordinates.high
         beyond = x >= high * (1.0 - 1e-3)
-        return bool(beyond[0]) or not self.slips(parameters), bool(beyond[1]), bool(beyond[2])
+        return bool(beyond[0]), bool(beyond[1]), bool(beyond[2])
 
     def clipped(self, parameters: Bingham) -> Bingham:
         """Return the parameters clipped to the bounds."""
@@ -324,7 +322,7 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
 
         Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
         """
-        together = np.column_stack([-fit.slopes * objective.coordinates.slopes(x), fit.residuals])
+        together = np.column_stack([-fit.slopes @ objective.coordinates.slopes(x), fit.residuals])
         together /= norm
         return np.asarray(np.linalg.qr(together, mode="r"))
 

@@ -103,7 +103,8 @@ def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) 
     asked = two_tones(CHARGED, ((0.01, 1.38), (0.01, 1.42)), rng)
     start = asked.start_with(CHARGED)
     found = fit(asked, ("gas_spring",), start, evaluations=1)
-    friction, _, _, charge = start
-    along = found.jacobian.dense() @ np.array([friction, 1.0, 1.0, charge])
+    friction, damping, compliance, charge = start
+    # C and 1/k are the hyperbolic sines of their coordinates; the first grows with the forces, the second falls
+    along = found.jacobian.dense() @ np.array([friction, np.tanh(damping), -np.tanh(compliance), charge])
     exact = [-o.standardised(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
     assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)

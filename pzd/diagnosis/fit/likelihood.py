@@ -243,6 +243,10 @@ LARGEST_DELAY = 3.0
 """Standard deviations of a test's delay to which the part of the shift beyond its slope is limited.
 
 Reason: the customary bound for what a normal prior still allows."""
+SHIFTS = 4
+"""Steps in which the likeliest delay of a test is found, each along the slope of the force.
+
+Reason: a jump of dry friction goes by a sample or two a step."""
 DISCREPANCY = 0.3
 """Share of what a model leaves (r.m.s.) that counts as noise of every harmonic alike while the model is being fitted: a
 model that still lacks something must not be bent to where the noise happens to be smallest.
@@ -449,8 +453,12 @@ def with_nuisances(
         ]
     )
     nuisances = MarginalisedNuisances.from_columns(bare.standardised(columns))
-    likeliest = float(nuisances.most_likely(bare.standardised(bare.measured - force))[0])
-    delay = nuisance.delay_s * float(np.clip(likeliest, -LARGEST_DELAY, LARGEST_DELAY))
+    likeliest = 0.0
+    for _ in range(SHIFTS):
+        left = bare.measured - shown(nuisance.delay_s * likeliest)
+        further = float(nuisances.most_likely(bare.standardised(left))[0])
+        likeliest = float(np.clip(likeliest + further, -LARGEST_DELAY, LARGEST_DELAY))
+    delay = nuisance.delay_s * likeliest
     measured = bare.measured - (shown(delay) - force - delay * late)
     return replace(bare, measured=measured, nuisances=nuisances)
 

@@ -62,8 +62,8 @@ class Budget:
 
 
 UNSEEN = (0.1, 1e-3)
-"""C [largest force over largest speed] and 1/k [range of displacement over largest force] below which the priors tell no
-values apart: hardly any damping, hardly any oil spring."""
+"""C [largest force over largest speed] and 1/k [range of displacement over largest force] below which the priors tell
+no values apart: hardly any damping, hardly any oil spring."""
 BOUND = 1e4
 """Limit of scaled parameters, and of the inverse of those searched by their logarithm."""
 ZERO = Parameter(
