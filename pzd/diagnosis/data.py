@@ -289,8 +289,8 @@ def _smoothed_displacement(record: Record) -> Record:
     spectrum[frequency > motion_below(record.displacement) * record.rate / (2.0 * np.pi)] = 0.0
     smooth = np.fft.irfft(spectrum, 2 * n - 1)[:n] + line
     course = make_interp_spline(np.arange(n), smooth, DEGREE)
-    rates = (np.asarray(course(np.arange(n), order)) * record.rate**order for order in (1, 2))
-    return _with_motion(record, (smooth, *rates))
+    speed, acceleration = (np.asarray(course(np.arange(n), order)) * record.rate**order for order in (1, 2))
+    return _with_motion(record, (smooth, speed, acceleration))
 
 
 # --- Exclusion of saturated records

@@ -3,9 +3,9 @@
 Equation: T0 = min(F, 0.45 k X) x_1, C = c sinh x_2, 1/k = s sinh x_3
 
 T0 goes up to the peak force F, or to what lets the element slip within every full stroke X.
-Beyond c and s, which no test shows, they are logarithms; below they are linear, so that the limits of the law, friction
-alone (C = 0), viscous force alone (T0 = 0) and the rigid damper (1/k = 0), lie at zero, within reach, each with a finite
-derivative.
+Beyond c and s, which no test shows, they are logarithms; below they are linear, so that the limits of the law,
+friction alone (C = 0), viscous force alone (T0 = 0) and the rigid damper (1/k = 0), lie at zero, within reach, each
+with a finite derivative.
 """
 
 from __future__ import annotations

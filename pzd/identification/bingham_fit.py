@@ -27,8 +27,8 @@ from pzd.record import Array
 # --- Criterion and search coordinates ---
 
 AT_LIMIT = 1e-6
-"""A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much of
-what no test shows."""
+"""A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much
+of what no test shows."""
 
 
 class Bingham(NamedTuple):
@@ -413,7 +413,7 @@ def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int
 def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
     """Return the best member of the last generation of a differential evolution on the criterion.
 
-    Equation: minimise W_s over log T0, log C, log 1/k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
+    Equation: minimise W_s over log T0, log C, log 1/k   Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
 
     Parameters
     ----------

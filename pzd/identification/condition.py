@@ -151,6 +151,8 @@ def parameter_row(
     names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "positive", "inverse"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
+        if not known and name == "C_Ns_per_m" and np.isfinite(width):
+            cells |= {**interval_columns(name, value, float(width), scale), name: None}
     if stiffest is not None and np.isfinite(stiffest):
         cells["k_N_per_m_low95"] = stiffest
     cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}

@@ -30,8 +30,8 @@ WEAK_SHIFT = 0.2
 FRICTION_FLOOR = 0.05
 """T0 is judged against itself or this share of the r.m.s. force, the larger: a friction of zero is a result."""
 SPRING_TO_NOISE = 10.0
-"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below, the
-fit of k follows the noise."""
+"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below,
+the fit of k follows the noise."""
 LARGEST_RESIDUAL = 0.2
 """Residual, as a share of the r.m.s. force, above which all parameters are weak."""
 CONVERGENCE_COSINE = 1e-3

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
-import pzd.cli  # noqa: F401  # before numpy: as in the command, the linear algebra has one thread
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 from scipy.stats import qmc
@@ -100,8 +99,8 @@ class Case:
         dampers = "; ".join(f"T0 {d.friction:.4g} C {d.damping:.4g} k {d.stiffness:.4g}" for d in self.dampers)
         tests = ", ".join(f"{t.kind} {t.frequency:.3g} Hz {1e3 * t.amplitude:.3g} mm" for t in self.campaign.tests)
         return (
-            f"{dampers} | {self.campaign.rate:g} Hz, noise {100 * self.noise:.2g} % rho {self.correlation:.2f}, x noise "
-            f"{1e6 * self.displacement_noise:.2g} um step {1e6 * self.displacement_step:.3g} um | {tests}"
+            f"{dampers} | {self.campaign.rate:g} Hz, noise {100 * self.noise:.2g} % rho {self.correlation:.2f}, "
+            f"x noise {1e6 * self.displacement_noise:.2g} um step {1e6 * self.displacement_step:.3g} um | {tests}"
         )
 
 
@@ -181,7 +180,7 @@ def _stiffness(
     softest = max(friction / (stroke * SOFTEST), damping / SLOWEST)
     wanted = (
         friction / (stroke * log_between(share, STIFFEST, SOFTEST))
-        if by_friction and friction > 0.0 or damping == 0.0
+        if (by_friction and friction > 0.0) or damping == 0.0
         else damping / log_between(share, QUICKEST, SLOWEST)
     )
     return float(max(wanted, softest))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper import parameter_rows
+from pzd.damper.compiled.kernels import K
 from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
@@ -54,7 +55,7 @@ class KernelInputs:
         Linear between nodes is k, so that along a voltage the difference of 1/k is formed where it is needed.
         """
         same_voltage = self.effective_voltage is other.effective_voltage and np.array_equal(
-            self.at_nodes[:, parameter_rows.K], other.at_nodes[:, parameter_rows.K]
+            self.at_nodes[:, K], other.at_nodes[:, K]
         )
         mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
         mine, others = _with_compliance(mine), _with_compliance(others)
@@ -75,7 +76,7 @@ class KernelInputs:
 def _with_compliance(rows: Array) -> Array:
     """Return (n, r) rows with 1/k in the place of k."""
     moved = rows.copy()
-    moved[:, parameter_rows.K] = 1.0 / rows[:, parameter_rows.K]
+    moved[:, K] = 1.0 / rows[:, K]
     return moved
 
 
