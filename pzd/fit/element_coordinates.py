@@ -54,8 +54,8 @@ class ElementCoordinates:
         return np.array([friction, np.arcsinh(damping / HARDLY_DAMPING), np.arcsinh(compliance / HARDLY_ELASTIC)])
 
     def to_search(self, friction: float, damping: float, stiffness: float) -> Array:
-        """Return the coordinates (3,) of T0 [N], C [N s/m] and k [N/m], which may be infinite."""
-        compliance = 1.0 / stiffness
+        """Return the coordinates (3,) of T0 [N], C [N s/m] and k [N/m], infinite or no less than is searched."""
+        compliance = 1.0 / max(stiffness, self.force / (LARGEST[2] * self.stroke))
         return np.array(
             [
                 friction / self._largest_friction(compliance),

@@ -145,7 +145,7 @@ def search_directions(
 
 
 def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
-    """Compute the force at the compared samples of an observation and its derivatives along some directions.
+    """Compute the force along the motion of an observation and its derivatives along some directions.
 
     The dependence of the kernel inputs on the parameters is differenced; the path integrates the derivatives exactly.
 
@@ -157,7 +157,7 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
 
     Returns
     -------
-    (n,) force [N], (n, d) slopes [N]
+    (m,) force [N] and (m, d) slopes [N] along the motion, as the channel shows them
     """
     budget.add(o.motion.time.size * (1 + len(given.pairs)))
     parallel = given.centre.parallel_force(o)
@@ -175,14 +175,13 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
     for j, change in enumerate(changes):
         slopes[:, j] += change
     if not given.centre.sensors:
-        return o.at_compared(force), o.at_compared(slopes)
+        return force, slopes
     shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
             change = o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
             shown[:, 1 + j] += change / width
-    compared = o.at_compared(shown)
-    return compared[:, 0], compared[:, 1:]
+    return shown[:, 0], shown[:, 1:]
 
 
 def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
@@ -265,9 +264,9 @@ def linearise(
     """
     residuals, forces, blocks = [], [], []
     for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        standardised = o.standardised(np.column_stack([o.measured - force, -slopes]))
+        standardised = o.residual_and_slopes(force, slopes)
         residuals.append(standardised[:, 0].copy())
-        forces.append(force)
+        forces.append(o.at_compared(force))
         blocks.append((columns, standardised[:, 1:].copy()))
     return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
 
@@ -276,13 +275,13 @@ def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> B
     """Compute the Jacobian of the force at the compared samples [N] by all variables; see `linearise`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
-    return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+    return BlockJacobian(x.size, tuple((columns, o.at_compared(slopes)) for o, columns, _, slopes in found))
 
 
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
 ) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
-    """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
+    """Yield each observation with its active variables, and force (m,) and derivatives (m, columns) along its motion."""
     low, high = limits
     free = low.size
     point = problem.point(x, unknowns)
