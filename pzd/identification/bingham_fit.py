@@ -92,7 +92,8 @@ class Objective:
         return np.concatenate(forces), np.concatenate(slopes)
 
     @cached_property
-    def _weight(self) -> Array:
+    def weight(self) -> Array:
+        """Weight (N,) of the counted samples: 0 beside an unresolved jump of the force, else 1."""
         return np.concatenate([t.weight[t.counted] for t in self.prepared])
 
     def projected(self, values: Array) -> Array:
@@ -100,7 +101,7 @@ class Objective:
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
-        values = values * self._weight.reshape(-1, *([1] * (values.ndim - 1)))
+        values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
@@ -248,16 +249,17 @@ def fit_separable(objective: Objective) -> Fit:
     """Find the global optimum of the criterion from the characteristic and the grid.
 
     Descents are made until the best optimum has been reached twice. The second need not converge: a criterion so close
-    to that of a known optimum is no coincidence.
+    to that of a known optimum is no coincidence. That from the rigid damper is made in any case, since no grid over 1/k
+    comes near it.
     """
     best = descend(objective, graphical_start(objective.prepared))
-    for start in (fit_rigid(objective).parameters, *grid_starts(objective)):
+    for start in grid_starts(objective):
         try:
             fit = descend(objective, start, best.criterion)
         except KnownOptimum:
-            return best
+            break
         best = min(best, fit, key=lambda f: f.criterion)
-    return best
+    return min(best, descend(objective, fit_rigid(objective).parameters), key=lambda f: f.criterion)
 
 
 def fit_rigid(objective: Objective) -> Fit:

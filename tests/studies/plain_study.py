@@ -131,8 +131,9 @@ def case(number: int, u: Sequence[float], rng: Generator) -> Case:
     speed = max(2.0 * np.pi * t.frequency * t.amplitude for t in tests)
     peak, share = log_between(u[5], 50.0, 2e4), with_ends(u[6])
     friction, damping = share * peak, (1.0 - share) * peak / speed
-    stiffness = _stiffness(friction, damping, amplitude, u[7], u[14] < 0.5, u[8])
-    gain, growth = 1.0 + 3.0 * u[9], rng.uniform(-0.2, 0.5, 2)
+    gain, growth = (1.0 + 3.0 * u[9] if levels > 1 else 1.0), rng.uniform(-0.2, 0.5, 2)
+    stroke = 2.0 * min(t.amplitude for t in tests)
+    stiffness = _stiffness(gain * friction, 1.5 * damping, stroke, u[7], u[14] < 0.5, u[8])
     courses = np.linspace(0.0, 1.0, levels)
     return Case(
         number,
@@ -170,13 +171,10 @@ def _tests(
     return every[: max(len(values) * (fits // len(values)), len(values))]
 
 
-def _stiffness(
-    friction: float, damping: float, amplitude: float, rigid: float, by_friction: bool, share: float
-) -> float:
-    """Return k by T0/k over the stroke or by C/k, neither beyond what a damper has."""
+def _stiffness(friction: float, damping: float, stroke: float, rigid: float, by_friction: bool, share: float) -> float:
+    """Return k by T0/k over the least stroke or by C/k, neither beyond what a damper has."""
     if rigid < LIMIT_SHARE:
         return np.inf
-    stroke = 2.0 * amplitude
     softest = max(friction / (stroke * SOFTEST), damping / SLOWEST)
     wanted = (
         friction / (stroke * log_between(share, STIFFEST, SOFTEST))

@@ -281,7 +281,7 @@ def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> B
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
 ) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
-    """Yield each observation with its active variables, and force (m,) and derivatives (m, columns) along its motion."""
+    """Yield each observation with its active variables, force (m,) and derivatives (m, columns) along its motion."""
     low, high = limits
     free = low.size
     point = problem.point(x, unknowns)
