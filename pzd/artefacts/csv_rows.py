@@ -25,7 +25,7 @@ class Estimate(NamedTuple):
     value: float | None
     """None where the data do not determine it."""
     low95: float | None = None
-    """None where nobody fitted the value, as after an edit."""
+    """None where nobody fitted the value, as after an edit, or where there is no end."""
     high95: float | None = None
 
     @classmethod

@@ -209,6 +209,7 @@ class ParameterRow(ConditionRow):
     T0_N_high95: float | None
     C_Ns_per_m: float | None = Field(ge=0.0)
     C_Ns_per_m_low95: float | None
+    """Without a value: between these two it is undetermined."""
     C_Ns_per_m_high95: float | None
     k_N_per_m: float | None = Field(gt=0.0)
     k_N_per_m_low95: float | None
@@ -332,9 +333,9 @@ def _unphysical(rows: tuple[ParameterRow, ...], path: Path) -> list[str]:
 def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     """Return the baseline of one setting: the damper with its identified parameters and no effect.
 
-    A value that the data do not determine is taken from the nearest condition that has it
-    (by voltage, then temperature); where no condition has it, from `FALLBACK`. A k that has a lower bound alone is not
-    below it.
+    A value that the data do not determine is taken from the nearest condition that has it (by voltage, then
+    temperature), within its own interval where it has one; where no condition has it, it is the middle of that
+    interval, else from `FALLBACK`.
 
     Raises
     ------
@@ -371,8 +372,11 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
 
     def value(name: str) -> float:
         known = [(distance(other), float(getattr(other, name))) for other in rows if getattr(other, name) is not None]
-        bound = getattr(row, f"{name}_low95") if getattr(row, name) is None else None
-        return max(min(known)[1], bound or 0.0) if known else FALLBACK[name]
+        if (mine := getattr(row, name)) is not None:
+            return float(mine)
+        low, high = getattr(row, f"{name}_low95"), getattr(row, f"{name}_high95")
+        found = min(known)[1] if known else FALLBACK[name] if high is None else 0.5 * ((low or 0.0) + high)
+        return max(min(found, math.inf if high is None else high), low or 0.0)
 
     return BaseRow(
         voltage_V=row.voltage_V, temperature_degC=row.temperature_degC, **{name: value(name) for name in FALLBACK}

@@ -6,8 +6,8 @@ Eliminating y gives dF/dt = k dx/dt - (k/C) soft(F, T0), whose right-hand side i
 turn round, G = F sign(dx/dt) passes through slip against the motion, stick, and slip with it, in this order: `stick`
 and `slip` are their closed forms, and all that there is.
 
-The limits of the law are in it. With 1/k = 0 the damper is rigid, F = T0 sign(dx/dt) + C dx/dt, and holds any force up to
-T0 at rest; with C = 0 it is elasto-plastic; with T0 = 0 a Maxwell element.
+The limits of the law are in it. With 1/k = 0 the damper is rigid, F = T0 sign(dx/dt) + C dx/dt, and holds any force up
+to T0 at rest; with C = 0 it is elasto-plastic; with T0 = 0 a Maxwell element.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ def element_force_sensitivities(
     """Compute the force of the Bingham element and its derivatives by T0, C and 1/k at a fixed initial force.
 
     Each piece of the closed form is differentiated at fixed duration; the field is continuous at
-    |F| = T0, so the moving switching times add nothing. By the compliance 1/k the derivative is finite in a rigid damper
-    too, where it is -C^2 d2x/dt2 but at the instant of a reversal.
+    |F| = T0, so the moving switching times add nothing. By the compliance 1/k the derivative is finite in a rigid
+    damper too, where it is -C^2 d2x/dt2 but at the instant of a reversal.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ def march_sensitivities(
 RIGID = 1e-6
 """Deflection [m] of a rigid damper's oil spring on its path, by T0 + C v at 1 m/s: less than any displacement sensor
 shows, and not so stiff that rounding of the deflection shows in the force."""
-LEAST_DAMPING = 1e-4
+LEAST_DAMPING = 1e-2
 """Least C on its path [N s/m], and least C v at 1 m/s as a share of T0: the flow curve has to rise, to be inverted."""
 
 

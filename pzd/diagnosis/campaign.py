@@ -15,7 +15,6 @@ import numpy as np
 from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import rows_per_voltage
-from pzd.diagnosis import thresholds
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult

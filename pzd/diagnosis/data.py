@@ -24,6 +24,7 @@ from pzd.record import Array, Record, conditions, distinct, is_constant, sliced,
 from pzd.signals.cycles import Cycles, cycles, drift_over_cycles, settled_cycles
 from pzd.signals.jumps import denoised_control
 from pzd.signals.lack_of_fit import ShortTimeMask
+from pzd.signals.measures import resolution
 from pzd.signals.noise import neighbouring_harmonics, pure_error
 from pzd.signals.segmentation import separate_tests
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
@@ -39,6 +40,8 @@ POINTS_OF_CYCLE = 16
 """Points per sample of the cleaned cycle."""
 POINTS_OF_DRAW = 4
 """Points per sample of a drawn cycle: fewer, for its deviation is noise."""
+DEGREE = 5
+"""Of the spline through a displacement that does not repeat: its second derivative is smooth still."""
 END_PARTS = 16
 """Parts of a record, of which the first and last give the temperature at its ends.
 
@@ -190,7 +193,7 @@ class AverageCycle:
         # A mean that walks would end every cycle with a step, which loads the oil spring.
         creep = drift_over_cycles(folded)
         error = pure_error(folded - creep + creep.mean())
-        finest = float(np.median(np.diff(np.unique(record.displacement))))
+        finest = resolution(record.displacement)
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
         return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)
 
@@ -272,19 +275,22 @@ def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, .
 
 
 def _smoothed_displacement(record: Record) -> Record:
-    """Cut the spectrum of the displacement where it sinks into noise; derivatives by the spectrum."""
+    """Cut the spectrum of the displacement where it sinks into noise; derivatives by a spline.
+
+    Those of the spectrum would ring from either end, where the curvature of the reflected record jumps.
+    """
+    from scipy.interpolate import make_interp_spline
+
     n = record.time.size
     line = np.linspace(record.displacement[0], record.displacement[-1], n)
     odd = record.displacement - line
     spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
     frequency = np.arange(spectrum.size) * record.rate / (2 * n - 1)
     spectrum[frequency > motion_below(record.displacement) * record.rate / (2.0 * np.pi)] = 0.0
-    slope = float(line[-1] - line[0]) / ((n - 1) / record.rate)
-
-    def derivative(order: int) -> Array:
-        return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n]
-
-    return _with_motion(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
+    smooth = np.fft.irfft(spectrum, 2 * n - 1)[:n] + line
+    course = make_interp_spline(np.arange(n), smooth, DEGREE)
+    speed, acceleration = (np.asarray(course(np.arange(n), order)) * record.rate**order for order in (1, 2))
+    return _with_motion(record, (smooth, speed, acceleration))
 
 
 # --- Exclusion of saturated records

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
 from pzd.signals.measures import reversals
 from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
-from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
+from pzd.signals.nuisance import NuisanceConfig, likely_delay, nuisance_forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +78,22 @@ def check_residual(
     without = residual - mains
     variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
-    size, timing = np.zeros(residual.size), np.zeros(residual.size)
-    size[mask], timing[mask] = nuisance_forces(
-        without[mask], predicted[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask
+    late, shifted = predicted, _shifted(prepared, predicted)
+    if prepared.constant:
+        delay = likely_delay((record.force - mains)[mask], lambda d: shifted(d)[mask], variance, config, calm[mask])
+        late = shifted(delay) if abs(delay) * record.rate > 1.0 else predicted  # a lesser one goes along the slope
+    size, timing = np.zeros(residual.size), late - predicted
+    size[mask], further = nuisance_forces(
+        (record.force - mains - late)[mask],
+        late[mask],
+        record.rate,
+        variance,
+        config,
+        given.timing[mask],
+        calm[mask],
+        mask,
     )
+    timing[mask] += further
     near_jumps = _nuisance_near_jumps(record.force - mains, predicted, size, timing)
     explained = mains + np.where(mask & ~calm, near_jumps, size + timing)
     folded = _folded(prepared, residual - explained, mask)
@@ -90,6 +102,14 @@ def check_residual(
     else:
         found = _check_samples(prepared, mask, residual, explained, predicted)
     return replace(found, hum=float(np.max(np.abs(mains))))
+
+
+def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]:
+    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic between its samples."""
+    from scipy.interpolate import CubicSpline
+
+    time, course = prepared.record.time, CubicSpline(prepared.record.time, force)
+    return lambda delay: np.asarray(course(np.clip(time - delay, time[0], time[-1]))) if delay else force
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:

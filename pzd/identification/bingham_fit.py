@@ -19,18 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.element import element_force, element_force_sensitivities
-from pzd.fit.element_coordinates import LARGEST, ElementCoordinates
+from pzd.fit.element_coordinates import LARGEST, LARGEST_PRE_SLIP, ElementCoordinates
 from pzd.identification.config import EvolutionaryConfig
 from pzd.identification.prepared_record import PreparedRecord
 from pzd.record import Array
 
 # --- Criterion and search coordinates ---
 
-LARGEST_PRE_SLIP = 0.45
-"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement: the element still slips."""
 AT_LIMIT = 1e-6
-"""A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much of
-what no test shows."""
+"""A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much
+of what no test shows."""
 
 
 class Bingham(NamedTuple):
@@ -94,7 +92,8 @@ class Objective:
         return np.concatenate(forces), np.concatenate(slopes)
 
     @cached_property
-    def _weight(self) -> Array:
+    def weight(self) -> Array:
+        """Weight (N,) of the counted samples: 0 beside an unresolved jump of the force, else 1."""
         return np.concatenate([t.weight[t.counted] for t in self.prepared])
 
     def projected(self, values: Array) -> Array:
@@ -102,7 +101,7 @@ class Objective:
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
-        values = values * self._weight.reshape(-1, *([1] * (values.ndim - 1)))
+        values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
@@ -138,7 +137,7 @@ class Objective:
         """Tell whether each parameter lies at a bound of the search; the limits of the law are results."""
         x, high = self.coordinates.to_search(*parameters), self.coordinates.high
         beyond = x >= high * (1.0 - 1e-3)
-        return bool(beyond[0]) or not self.slips(parameters), bool(beyond[1]), bool(beyond[2])
+        return bool(beyond[0]), bool(beyond[1]), bool(beyond[2])
 
     def clipped(self, parameters: Bingham) -> Bingham:
         """Return the parameters clipped to the bounds."""
@@ -250,16 +249,17 @@ def fit_separable(objective: Objective) -> Fit:
     """Find the global optimum of the criterion from the characteristic and the grid.
 
     Descents are made until the best optimum has been reached twice. The second need not converge: a criterion so close
-    to that of a known optimum is no coincidence.
+    to that of a known optimum is no coincidence. That from the rigid damper is made in any case, since no grid over 1/k
+    comes near it.
     """
     best = descend(objective, graphical_start(objective.prepared))
-    for start in (fit_rigid(objective).parameters, *grid_starts(objective)):
+    for start in grid_starts(objective):
         try:
             fit = descend(objective, start, best.criterion)
         except KnownOptimum:
-            return best
+            break
         best = min(best, fit, key=lambda f: f.criterion)
-    return best
+    return min(best, descend(objective, fit_rigid(objective).parameters), key=lambda f: f.criterion)
 
 
 def fit_rigid(objective: Objective) -> Fit:
@@ -324,7 +324,7 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
 
         Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
         """
-        together = np.column_stack([-fit.slopes * objective.coordinates.slopes(x), fit.residuals])
+        together = np.column_stack([-fit.slopes @ objective.coordinates.slopes(x), fit.residuals])
         together /= norm
         return np.asarray(np.linalg.qr(together, mode="r"))
 
@@ -415,7 +415,7 @@ def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int
 def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
     """Return the best member of the last generation of a differential evolution on the criterion.
 
-    Equation: minimise W_s over log T0, log C, log 1/k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
+    Equation: minimise W_s over log T0, log C, log 1/k   Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
 
     Parameters
     ----------

@@ -71,7 +71,8 @@ def fit_with_auxiliary(
         return whole, element_alone, None
     values = auxiliary_start(whole)
     objective = without_auxiliary_force(whole, values)
-    fit = _optimum(objective, config, seed)
+    starts = _optimum(objective, config, seed), descend(objective, element_alone.parameters)
+    fit = min(starts, key=lambda f: f.criterion)
     values = values + auxiliary_remainder(objective, fit)
     objective = without_auxiliary_force(whole, values)
     fit = descend(objective, fit.parameters)
@@ -112,8 +113,7 @@ def parameter_rows(
     misfit = trust.misfit_of(records)
     noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
     widths = half_widths(records, misfit).reshape(-1, 3)
-    speed = objective.scales[1]
-    scales = np.stack([trust.parameter_scales(parameters, objective.measured, speed) for _, parameters in optimum])
+    scales = np.stack([trust.parameter_scales(parameters, objective.measured) for _, parameters in optimum])
     shares = trust.partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
     cosines = trust.stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
     rows = []
@@ -152,6 +152,8 @@ def parameter_row(
     names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "positive", "inverse"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
+        if not known and name == "C_Ns_per_m" and np.isfinite(width):
+            cells |= {**interval_columns(name, value, float(width), scale), name: None}
     if stiffest is not None and np.isfinite(stiffest):
         cells["k_N_per_m_low95"] = stiffest
     cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}
@@ -185,10 +187,10 @@ class Auxiliary:
 
 
 def auxiliary_columns(objective: Objective) -> tuple[Array, float]:
-    """Return the forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the counted samples, and the mid-stroke [m]."""
+    """Return the forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the samples that weigh, and the mid-stroke [m]."""
     middle = mid_stroke(t.displacement for t in objective.prepared)
     x = np.concatenate([t.at_samples(t.displacement)[t.counted] for t in objective.prepared]) - middle
-    return np.column_stack([np.ones(x.size), x]), middle
+    return np.column_stack([np.ones(x.size), x]) * objective.weight[:, None], middle
 
 
 def auxiliary_is_visible(objective: Objective, fit: Fit) -> bool:
@@ -208,10 +210,11 @@ def auxiliary_start(objective: Objective) -> Array:
     """
     columns, _ = auxiliary_columns(objective)
     speed = np.concatenate([t.at_samples(np.gradient(t.displacement, t.step))[t.counted] for t in objective.prepared])
-    terms = np.column_stack([columns, np.sign(speed), speed])
+    terms = np.column_stack([columns, np.sign(speed) * objective.weight, speed * objective.weight])
     size = np.linalg.norm(terms, axis=0)
     size[size == 0.0] = 1.0
-    return np.asarray((np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2])
+    measured = objective.measured * objective.weight
+    return np.asarray((np.linalg.lstsq(terms / size, measured, rcond=1e-9)[0] / size)[:2])
 
 
 def without_auxiliary_force(objective: Objective, values: Array) -> Objective:
@@ -228,7 +231,7 @@ def without_auxiliary_force(objective: Objective, values: Array) -> Objective:
 def auxiliary_remainder(objective: Objective, fit: Fit) -> Array:
     """Estimate the remainder of F_0 and k_g (2,) at an optimum, to be added to what was subtracted."""
     columns, _ = auxiliary_columns(objective)
-    left = objective.measured - objective.simulated(fit.parameters)
+    left = (objective.measured - objective.simulated(fit.parameters)) * objective.weight
     return np.asarray(np.linalg.lstsq(columns, left, rcond=None)[0], dtype=np.float64)
 
 
@@ -246,7 +249,7 @@ def significant_auxiliary(
     nuisance : standard deviations of what differs from test to test
     """
     columns, middle = auxiliary_columns(objective)
-    slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1], columns])
+    slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1] * objective.weight[:, None], columns])
     fitted = fitted_records(records, objective.prepared, (fit.residuals, slopes), nuisance)
     misfit = trust.misfit_of(fitted)
     if not np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]):

@@ -160,7 +160,9 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     def slopes_at(x: Array) -> Array:
         free = parameters(x)
         slopes = objective.slopes(free, objective.residuals(free))
-        return np.asarray(-slopes * np.concatenate([constant.coordinates.slopes(p) for p in x.reshape(-1, 3)]) / norm)
+        parts = np.split(slopes, len(free), axis=1)
+        own = [part @ constant.coordinates.slopes(p) for part, p in zip(parts, x.reshape(-1, 3), strict=True)]
+        return np.asarray(-np.hstack(own) / norm)
 
     start = np.concatenate([constant.to_search(s) for s in starts])
     found = least_squares(

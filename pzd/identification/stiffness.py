@@ -1,8 +1,9 @@
 """Whether the tests show the oil spring: the rigid damper beside the elastic one, and how stiff it is at least.
 
-A stiff oil spring shows for an instant after each reversal alone, so that neither the curvature of the criterion at 1/k
-= 0 nor at its optimum says how far 1/k may go. Models are compared as wholes instead: what one would change of the other
-is a column beside the slopes, and noise, sensors and the parameters that follow say how well its amplitude is known.
+A stiff oil spring shows for an instant after each reversal alone, so that neither the curvature of the criterion at
+1/k = 0 nor at its optimum says how far 1/k may go. Models are compared as wholes instead: what one would change of the
+other is a column beside the slopes, and noise, sensors and the parameters that follow say how well its amplitude is
+known.
 """
 
 from __future__ import annotations
@@ -15,10 +16,14 @@ from pzd.fit.element_coordinates import HARDLY_ELASTIC
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_rigid
 from pzd.identification.intervals import half_widths
 from pzd.identification.prepared_record import fitted_records
-from pzd.identification.trust import Misfit
+from pzd.identification.trust import EXACT_FIT, Misfit
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
 
+MUCH_WORSE = 2.0
+"""Ratio of the criteria at which a model is rejected whatever the misfit of both, which passes for noise here.
+
+Reason: of ten independent residuals and three parameters, F = 7 is beyond 95 %."""
 BISECTIONS = 7
 """Halvings of the logarithm of the bound: it is known to a few percent then."""
 
@@ -67,6 +72,8 @@ def _rejected(records: Sequence[Record], objective: Objective, best: Fit, other:
     change = best.residuals - other.residuals
     if not np.any(change):
         return False
+    if other.criterion > MUCH_WORSE * best.criterion and other.criterion > EXACT_FIT:
+        return True
     columns = np.column_stack([best.slopes[:, :2], change])
     size = np.linalg.norm(columns, axis=0)
     amplitude = np.linalg.lstsq(columns / np.where(size > 0.0, size, 1.0), best.residuals, rcond=1e-12)[0][2] / size[2]

@@ -28,11 +28,10 @@ WEAK_WIDTH = 0.1
 WEAK_SHIFT = 0.2
 """Largest shift by the sensor error of a parameter that is not weak, as a share of it."""
 FRICTION_FLOOR = 0.05
-"""T0, and the viscous force at the r.m.s. speed, are judged against themselves or this share of the r.m.s. force, the
-larger: a friction or a damping of zero is a result."""
+"""T0 is judged against itself or this share of the r.m.s. force, the larger: a friction of zero is a result."""
 SPRING_TO_NOISE = 10.0
-"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below, the
-fit of k follows the noise."""
+"""Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below,
+the fit of k follows the noise."""
 LARGEST_RESIDUAL = 0.2
 """Residual, as a share of the r.m.s. force, above which all parameters are weak."""
 CONVERGENCE_COSINE = 1e-3
@@ -69,10 +68,12 @@ class ParameterEvidence:
 
     def _unknown(self) -> str | None:
         """Return the reason why the numbers do not determine it, None where they do."""
-        if self.sensitivity <= 0.0:
+        if self.sensitivity <= 0.0 < self.scale:
             return "the force does not depend on it, or another parameter makes it up"
-        if self.shift > UNDETERMINED_SHARE:
+        if self.shift > UNDETERMINED_SHARE and self.scale > 0.0:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
+        if self.scale == 0.0:
+            return f"none to {self.half_width:.2g}, and these tests show no more of it"
         if not self.noise <= UNDETERMINED_SHARE * self.scale:
             return f"95 % interval of +-{_percent(self.noise / self.scale)} by noise alone"
         return None
@@ -187,11 +188,10 @@ def friction_scale(friction: float, force: Array) -> float:
     return max(friction, FRICTION_FLOOR * rms(force))
 
 
-def parameter_scales(parameters: Bingham, measured: Array, speed: float) -> Array:
-    """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N], by measured forces [N] and a peak speed [m/s]."""
-    least = FRICTION_FLOOR * rms(measured) / (np.sqrt(0.5) * speed)  # at the r.m.s. speed of a sine
+def parameter_scales(parameters: Bingham, measured: Array) -> Array:
+    """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N], by measured forces (N,) [N]."""
     friction, damping, stiffness = parameters
-    return np.array([friction_scale(friction, measured), max(damping, least), 1.0 / stiffness])
+    return np.array([friction_scale(friction, measured), damping, 1.0 / stiffness])
 
 
 def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:

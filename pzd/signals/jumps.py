@@ -78,7 +78,7 @@ FLANK_TO_NOISE = 8.0
 
 
 def unresolved_flanks(force: Array, turns: Sequence[int], rate: float) -> Mask:
-    """Find the samples on either side of a jump at a reversal of the rod that goes most of its way within one interval.
+    """Find the samples from a reversal of the rod to a jump of the force that goes most of its way within one interval.
 
     Its instant is chance there; a flank of several samples is evidence of the oil spring.
 
@@ -102,7 +102,8 @@ def unresolved_flanks(force: Array, turns: Sequence[int], rate: float) -> Mask:
             continue
         change, steepest = abs(float(force[high - 1] - force[low])), int(np.argmax(np.abs(steps)))
         if abs(steps[steepest]) > max(0.5 * change, FLANK_TO_NOISE * noise):
-            found[low + steepest : low + steepest + 2] = True
+            jump = low + steepest
+            found[max(min(jump, turn - 1), 0) : max(jump, turn) + 2] = True  # late or early, that is chance too
     return found
 
 

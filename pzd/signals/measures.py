@@ -56,6 +56,21 @@ def criterion(residual: Array, measured: Array) -> float:
     return float(residual @ residual / (measured @ measured))
 
 
+WHOLE_STEPS = 0.05
+"""Largest median distance of the steps of a quantised channel from a whole number of the least one."""
+
+
+def resolution(values: Array) -> float:
+    """Return the step in whole numbers of which a channel (n,) is recorded, in its unit; 0 where it has none."""
+    levels = np.unique(values)
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * np.ptp(values)]  # less is rounding
+    if not steps.size:
+        return 0.0
+    whole = steps / np.min(steps)
+    return float(np.min(steps)) if np.median(np.abs(whole - np.round(whole))) < WHOLE_STEPS else 0.0
+
+
 REVERSAL_SHARE = 0.1
 """Least stroke between two reversals, as a share of the range: noise and the creep of a servo stay below it."""
 

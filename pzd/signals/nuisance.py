@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -86,6 +88,46 @@ def reducing_share(residual: Array, explained: Array) -> float:
     """
     power = float(explained @ explained)
     return float(np.clip(residual @ explained / power, 0.0, 1.0)) if power > 0.0 else 1.0
+
+
+DELAYS_TRIED = 29
+"""Delays that are compared, over all that the prior admits: a quarter of its deviation apart."""
+
+
+def likely_delay(
+    measured: Array, delayed: Callable[[float], Array], variance: float, config: NuisanceConfig, calm: NDArray[np.bool_]
+) -> float:
+    """Return the most likely delay of a test [s], by shifts of the force as a whole.
+
+    Where a force jumps, as that of a rigid damper at a reversal, a delay of more than a sample is no change along its
+    slope.
+
+    Equation: min_d min_b |F - A_d b - F(t - d)|^2 / s^2 + |b|^2 + (d / sd_d)^2, A_d = [sd_o peak, sd_g F(t - d)]
+
+    Parameters
+    ----------
+    measured : (m,) force [N]
+    delayed : gives the predicted force (m,) at a delay [s]
+    variance : of the noise [N^2]
+    config : standard deviations of the priors
+    calm : (m,) the samples that enter, those beside no jump of the measured force
+    """
+    if config.delay_s == 0.0:
+        return 0.0
+    peak, force = float(np.max(np.abs(measured))), measured[calm]
+    weight = max(variance, 1e-12 * peak**2)
+    shares = np.linspace(-NUISANCE_LIMIT, NUISANCE_LIMIT, DELAYS_TRIED)
+    costs = np.empty(shares.size)
+    for i, share in enumerate(shares):
+        predicted = delayed(share * config.delay_s)[calm]
+        columns = np.column_stack([np.full(force.size, config.offset * peak), config.gain * predicted])
+        left, pulled = force - predicted, columns.T @ (force - predicted) / weight
+        own = np.linalg.solve(columns.T @ columns / weight + np.eye(2), pulled)
+        costs[i] = float(left @ left) / weight - float(own @ pulled) + share**2
+    best = int(np.clip(np.argmin(costs), 1, shares.size - 2))
+    bend = costs[best - 1] - 2.0 * costs[best] + costs[best + 1]
+    between = 0.5 * (costs[best - 1] - costs[best + 1]) / bend if bend > 0.0 else 0.0
+    return float(config.delay_s * (shares[best] + np.clip(between, -1.0, 1.0) * (shares[1] - shares[0])))
 
 
 def nuisance_columns(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:

@@ -118,9 +118,9 @@ def test_a_common_delay_is_known_no_better_than_the_delays_of_the_tests_let_it(
 def test_t0_c_and_k_beside_an_effect_have_intervals_that_hold_them(rng: np.random.Generator) -> None:
     effects = {"orifice_quadratic": {"q": 1500.0}}
     evidence, found = fitted_to(tuple(shown_late(0.0, effects, test, rng) for test in FOUR), effects)
-    widths = base_half_widths(found, evidence.whole.scales.force)
+    widths = base_half_widths(found, evidence.whole.coordinates)
     fitted, true = (
-        np.array([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in damper.base])
+        np.array([(r.T0_N, r.C_Ns_per_m, 1.0 / r.k_N_per_m) for r in damper.base])
         for damper in (found.damper, damper_of((0.0, 150.0)))
     )
     assert np.all(np.abs(fitted - true) <= widths)

@@ -15,7 +15,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, simulated_force
+from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, shown_force
 from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -190,7 +190,7 @@ def test_a_part_that_begins_later_is_simulated_from_the_force_at_its_motions_fir
     parts = [o for half in found.halves for o in half.observations]
     assert any(o.sample_indices[0] > 0 for o in parts)
     for o in parts:
-        assert np.max(np.abs(o.measured - simulated_force(o, truth))) < 2.0, o.sample_indices[0]
+        assert np.max(np.abs(o.measured - o.at_compared(shown_force(o, truth)))) < 2.0, o.sample_indices[0]
 
 
 # --- Marginalised nuisances against the covariance matrix that they give the residuals

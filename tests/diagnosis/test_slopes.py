@@ -15,7 +15,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, shown_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.record import Array, Record
@@ -87,13 +87,15 @@ def test_residuals_and_jacobian_are_those_of_the_whole_damper(effect: str, movin
         of = problem.point(moved, unknowns).damper
         sensors = sensors_of(of)
         prompt = of.model_copy(update={"effects": {n: e for n, e in of.effects.items() if n not in sensors}})
-        return o.at_compared(o.through_sensors(respond(prompt, o.motion, o.initial_force, tolerance), sensors))
+        return o.through_sensors(respond(prompt, o.motion, o.initial_force, tolerance), sensors)
 
-    np.testing.assert_allclose(left.simulated[0], force(0, 0.0, SIMULATION_TOLERANCE), atol=1e-6 * o.peak)
-    counted = o.standardised(o.measured - left.simulated[0])
-    np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-9, atol=1e-9)
+    here = force(0, 0.0, SIMULATION_TOLERANCE)
+    np.testing.assert_allclose(left.simulated[0], o.at_compared(here), atol=1e-6 * o.peak)
+    counted = o.residual_and_slopes(here, np.zeros((here.size, 0)))[:, 0]
+    np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-5, atol=1e-5)
     for j in range(x.size):
-        exact = o.standardised(force(j, -2e-4, 1e-11) - force(j, 2e-4, 1e-11)) / 4e-4
+        slope = (force(j, 2e-4, 1e-11) - force(j, -2e-4, 1e-11)) / 4e-4
+        exact = o.residual_and_slopes(here, slope[:, None])[:, 1]
         missed = np.linalg.norm(left.jacobian.dense()[:, j] - exact)
         assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))
 
@@ -103,7 +105,9 @@ def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) 
     asked = two_tones(CHARGED, ((0.01, 1.38), (0.01, 1.42)), rng)
     start = asked.start_with(CHARGED)
     found = fit(asked, ("gas_spring",), start, evaluations=1)
-    friction, _, _, charge = start
-    along = found.jacobian.dense() @ np.array([friction, 1.0, 1.0, charge])
-    exact = [-o.standardised(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
+    friction, damping, compliance, charge = start
+    # C and 1/k are the hyperbolic sines of their coordinates; the first grows with the forces, the second falls
+    along = found.jacobian.dense() @ np.array([friction, np.tanh(damping), -np.tanh(compliance), charge])
+    shown = [shown_force(o, found.damper) for o in asked.observations]
+    exact = [o.residual_and_slopes(f, f[:, None])[:, 1] for o, f in zip(asked.observations, shown, strict=True)]
     assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)

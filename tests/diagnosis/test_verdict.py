@@ -16,7 +16,7 @@ from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import simulated_force
+from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import Detection, detections
 from pzd.diagnosis.search.candidates import candidates
@@ -70,12 +70,14 @@ def test_a_shape_that_the_tests_determine_is_paid_for() -> None:
 
 def left_by_refit(problem: Problem, hidden: Damper) -> float:
     """R.m.s. that the best T0, C and k leave of a damper's force, as a share of peak; each test counts alike."""
-    true = [simulated_force(o, hidden) for o in problem.observations]
+    true = [o.at_compared(shown_force(o, hidden)) for o in problem.observations]
 
     def missed(logs: Array) -> Array:
         T0, C, k = np.exp(logs)
         damper = Damper(base=(BaseRow(voltage_V=0.0, T0_N=T0, C_Ns_per_m=C, k_N_per_m=k),))
-        left = (simulated_force(o, damper) - force for o, force in zip(problem.observations, true, strict=True))
+        left = (
+            o.at_compared(shown_force(o, damper)) - force for o, force in zip(problem.observations, true, strict=True)
+        )
         return np.concatenate([r / o.peak / np.sqrt(r.size) for r, o in zip(left, problem.observations, strict=True)])
 
     best = least_squares(missed, np.log(TABLE_2[0.0]), x_scale="jac")

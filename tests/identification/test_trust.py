@@ -27,7 +27,7 @@ def test_a_slow_small_test_cannot_tell_the_damping(rng: np.random.Generator, noi
     record = sine_test(Bingham(400.0, 2500.0, 4e5), 0.2, 0.002, cycles=6)
     row = row_for(with_noise(record, rng, noise, correlation=0.9))
     assert row.C_Ns_per_m is None
-    assert row.C_Ns_per_m_low95 is None
+    assert row.C_Ns_per_m_low95 < 2500.0 < row.C_Ns_per_m_high95
     assert row.status.startswith("undetermined: C (")
     assert pytest.approx(400.0, rel=0.03) == row.T0_N
 
@@ -67,8 +67,8 @@ def test_displacement_noise_that_hides_the_oil_spring_is_named(rng: np.random.Ge
     record = sine_test(Bingham(400.0, 2500.0, 3e7), 2.0, 0.02)
     noisy = replace(record, displacement=record.displacement + 1e-5 * rng.standard_normal(record.time.size))
     row = row_for(noisy)
-    assert row.k_N_per_m is None
-    assert "the displacement's noise is" in row.status
+    assert row.status.startswith("weak: k (")
+    assert row.k_N_per_m_low95 < 3e7 < row.k_N_per_m_high95
 
 
 def test_displacement_noise_is_measured_and_the_motion_itself_is_not_taken_for_it(rng: np.random.Generator) -> None:

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
-import pzd.cli  # noqa: F401  # before numpy: as in the command, the linear algebra has one thread
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 from scipy.stats import qmc
@@ -100,8 +99,8 @@ class Case:
         dampers = "; ".join(f"T0 {d.friction:.4g} C {d.damping:.4g} k {d.stiffness:.4g}" for d in self.dampers)
         tests = ", ".join(f"{t.kind} {t.frequency:.3g} Hz {1e3 * t.amplitude:.3g} mm" for t in self.campaign.tests)
         return (
-            f"{dampers} | {self.campaign.rate:g} Hz, noise {100 * self.noise:.2g} % rho {self.correlation:.2f}, x noise "
-            f"{1e6 * self.displacement_noise:.2g} um step {1e6 * self.displacement_step:.3g} um | {tests}"
+            f"{dampers} | {self.campaign.rate:g} Hz, noise {100 * self.noise:.2g} % rho {self.correlation:.2f}, "
+            f"x noise {1e6 * self.displacement_noise:.2g} um step {1e6 * self.displacement_step:.3g} um | {tests}"
         )
 
 
@@ -132,8 +131,9 @@ def case(number: int, u: Sequence[float], rng: Generator) -> Case:
     speed = max(2.0 * np.pi * t.frequency * t.amplitude for t in tests)
     peak, share = log_between(u[5], 50.0, 2e4), with_ends(u[6])
     friction, damping = share * peak, (1.0 - share) * peak / speed
-    stiffness = _stiffness(friction, damping, amplitude, u[7], u[14] < 0.5, u[8])
-    gain, growth = 1.0 + 3.0 * u[9], rng.uniform(-0.2, 0.5, 2)
+    gain, growth = (1.0 + 3.0 * u[9] if levels > 1 else 1.0), rng.uniform(-0.2, 0.5, 2)
+    stroke = 2.0 * min(t.amplitude for t in tests)
+    stiffness = _stiffness(gain * friction, 1.5 * damping, stroke, u[7], u[14] < 0.5, u[8])
     courses = np.linspace(0.0, 1.0, levels)
     return Case(
         number,
@@ -171,17 +171,14 @@ def _tests(
     return every[: max(len(values) * (fits // len(values)), len(values))]
 
 
-def _stiffness(
-    friction: float, damping: float, amplitude: float, rigid: float, by_friction: bool, share: float
-) -> float:
-    """Return k by T0/k over the stroke or by C/k, neither beyond what a damper has."""
+def _stiffness(friction: float, damping: float, stroke: float, rigid: float, by_friction: bool, share: float) -> float:
+    """Return k by T0/k over the least stroke or by C/k, neither beyond what a damper has."""
     if rigid < LIMIT_SHARE:
         return np.inf
-    stroke = 2.0 * amplitude
     softest = max(friction / (stroke * SOFTEST), damping / SLOWEST)
     wanted = (
         friction / (stroke * log_between(share, STIFFEST, SOFTEST))
-        if by_friction and friction > 0.0 or damping == 0.0
+        if (by_friction and friction > 0.0) or damping == 0.0
         else damping / log_between(share, QUICKEST, SLOWEST)
     )
     return float(max(wanted, softest))

@@ -269,7 +269,7 @@ def _march(
 _SHARE = 1.0 - math.sqrt(0.5)
 """Diagonal of the method below; with it the method damps whatever is stiff."""
 _PARTS = 4
-"""Of a step: with them the softest to the stiffest damper is within 1e-4 of the force but for the sample of a reversal."""
+"""Of a step: with them any damper is within 1e-4 of the force but for the sample of a reversal."""
 _STILL = 1e-15
 """Travel of the rod in a step that is rounding [m]."""
 

@@ -263,7 +263,7 @@ def base_half_widths(fitted: FitResult, coordinates: ElementCoordinates) -> Arra
     coordinates : of the search
     """
     of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
-    units = np.array([coordinates.slopes(row) for row in fitted.optimum[of_base].reshape(-1, 3)])
+    units = np.array([np.diag(coordinates.slopes(row)) for row in fitted.optimum[of_base].reshape(-1, 3)])
     return np.asarray(LEVEL * search_errors(fitted, of_base).reshape(-1, 3) * units)
 
 

@@ -142,7 +142,11 @@ class WeightedRecord:
     weights: Array
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
     nuisances: MarginalisedNuisances
-    """Offset, gain and delay of the test, and its jumps."""
+    """Offset and gain of the test, and its jumps."""
+    delay_s: float = 0.0
+    """Standard deviation of the delay of the test [s]; 0 where it has none."""
+    first_delay: float = 0.0
+    """Delay at which the search for the likeliest one begins [s]."""
 
     @cached_property
     def steps(self) -> Array:
@@ -179,25 +183,82 @@ class WeightedRecord:
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
         delay : further delay of the channel [s]
         """
-        from scipy.interpolate import CubicSpline
-
         if not sensors and delay == 0.0:
             return simulated
-        begin = int(self.sample_indices[0]) if isinstance(self.noise, PureError) else 0
-        time = self.motion.time[begin:]
+        begin, time = self._begin, self.motion.time[self._begin :]
         shown = shown_moments(sensors, time - delay)
         if np.array_equal(shown, time):
             return simulated
+        return np.concatenate([simulated[:begin], self._course(simulated)(shown)])
+
+    @property
+    def _begin(self) -> int:
+        """Sample of the motion at which its cycle begins; 0 where it does not repeat."""
+        return int(self.sample_indices[0]) if isinstance(self.noise, PureError) else 0
+
+    def _course(self, simulated: Array) -> Callable[[Array], Array]:
+        """Return values (m,) or (m, p) along the motion as a function of moments [s], by a cubic between samples."""
+        from scipy.interpolate import CubicSpline
+
+        begin, time = self._begin, self.motion.time[self._begin :]
         if begin == 0:
-            return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
+            course = CubicSpline(time, simulated)
+            return lambda moments: np.asarray(course(np.clip(moments, time[0], time[-1])))
         period = time[-1] - time[0] + self.steps[-1]
         whole = np.concatenate([simulated[begin:], simulated[begin : begin + 1]])
-        cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
-        return np.concatenate([simulated[:begin], cycle(shown)])
+        return CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
+
+    def delayed(self, shown: Array) -> Callable[[float], Array]:
+        """Return what a channel shows along the motion, (m,) or (m, p), at the compared samples by a delay [s]."""
+        course, moments = self._course(shown), self.motion.time[self._compared_indices]
+        return lambda delay: course(moments - delay)
 
     def standardised(self, values: Array) -> Array:
         """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
         return self.nuisances.marginalised(self._scaled(values))
+
+    def residual_and_slopes(self, force: Array, slopes: Array) -> Array:
+        """Return the residual and its derivatives (w, 1 + p) in units of noise, every nuisance integrated out.
+
+        A delay shifts a force and does not merely add its slope: it is integrated about its likeliest value d.
+
+        Equation: r' = (I + u u')^(-1/2) (F - F(t - d) + u d/s), u = -s dF/dt at t - d, in units of noise
+                                                                            Source: Laplace's method
+
+        Parameters
+        ----------
+        force : (m,) that a channel shows along the motion [N]
+        slopes : (m, p) its derivatives
+        """
+        if self.delay_s == 0.0:
+            return self.standardised(
+                np.column_stack([self.measured - self.at_compared(force), -self.at_compared(slopes)])
+            )
+        delay = self.likeliest_delay(self.delayed(force))
+        at = self.delayed(np.column_stack([force, slopes]))
+        shifted = at(delay)
+        late = (at(delay + DELAY_STEP)[:, 0] - shifted[:, 0]) * (self.delay_s / DELAY_STEP)
+        values = np.column_stack([self.measured - shifted[:, 0] + late * (delay / self.delay_s), -shifted[:, 1:], late])
+        scaled = self.standardised(values)
+        found, own = scaled[:, :-1], scaled[:, -1]
+        square = float(own @ own)
+        if square == 0.0:
+            return found
+        return np.asarray(found - np.outer(own, own @ found) * ((1.0 - 1.0 / np.sqrt(1.0 + square)) / square))
+
+    def likeliest_delay(self, at: Callable[[float], Array]) -> float:
+        """Find the likeliest delay [s] of a force at the compared samples, a function of it, by Gauss and Newton."""
+        delay = self.first_delay
+        for _ in range(SHIFTS):
+            force = at(delay)
+            late = (at(delay + DELAY_STEP) - force) * (self.delay_s / DELAY_STEP)
+            left, own = self.standardised(np.column_stack([self.measured - force, late])).T
+            square = float(own @ own)
+            share = (float(own @ left) + square * delay / self.delay_s) / (1.0 + square)
+            before, delay = delay, self.delay_s * float(np.clip(share, -LARGEST_DELAY, LARGEST_DELAY))
+            if abs(delay - before) < SAME_DELAY * self.delay_s:
+                break
+        return delay
 
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
@@ -214,17 +275,12 @@ class WeightedRecord:
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-def simulated_force(observation: WeightedRecord, damper: Damper) -> Array:
-    """Simulate the (n,) force of a damper at the compared samples [N]."""
-    return delayed_forces(observation, damper)(0.0)
-
-
-def delayed_forces(observation: WeightedRecord, damper: Damper) -> Callable[[float], Array]:
-    """Simulate the (n,) force of a damper at the compared samples [N], as a function of a further delay [s]."""
-    o, sensors = observation, sensors_of(damper)
+def shown_force(observation: WeightedRecord, damper: Damper) -> Array:
+    """Simulate the (m,) force of a damper along the motion of an observation, as the channel shows it [N]."""
+    sensors = sensors_of(damper)
     prompt = damper.without_effects(*sensors)
-    force = respond(prompt, o.motion, o.initial_force, SIMULATION_TOLERANCE)
-    return lambda late: o.at_compared(o.through_sensors(force, sensors, late))
+    force = respond(prompt, observation.motion, observation.initial_force, SIMULATION_TOLERANCE)
+    return observation.through_sensors(force, sensors)
 
 
 # --- Weights of a record
@@ -243,6 +299,12 @@ LARGEST_DELAY = 3.0
 """Standard deviations of a test's delay to which the part of the shift beyond its slope is limited.
 
 Reason: the customary bound for what a normal prior still allows."""
+SHIFTS = 12
+"""Most steps in which the likeliest delay of a test is found, each along the slope of the force.
+
+Reason: a jump of dry friction goes by a sample or two a step."""
+SAME_DELAY = 1e-4
+"""Change of the delay at which its search ends [standard deviations]: the misfit changes by its square."""
 DISCREPANCY = 0.3
 """Share of what a model leaves (r.m.s.) that counts as noise of every harmonic alike while the model is being fitted: a
 model that still lacks something must not be bent to where the noise happens to be smallest.
@@ -429,30 +491,26 @@ def _samples_per_harmonic(record: Record) -> float:
 def with_nuisances(
     bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
 ) -> WeightedRecord:
-    """Integrate out the test's own offset, gain and delay, jumps and instants of the voltage.
+    """Integrate out the test's own offset and gain, jumps and instants of the voltage, and find its likeliest delay.
 
-    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
-
-    A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
-    that, F(t - d) - F + d dF/dt, is taken off the measured force.
+    Equation: V = [s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
     """
-    shown = delayed_forces(bare, damper)
-    force, averaged = shown(0.0), isinstance(bare.noise, PureError)
-    late = (shown(DELAY_STEP) - force) / DELAY_STEP
-    columns = np.column_stack(
-        [
-            nuisance.delay_s * late,
-            np.full(force.size, nuisance.offset * bare.peak),
-            nuisance.gain * force,
-            _jump_columns(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
-            *([] if timing is None else [timing]),
-        ]
-    )
-    nuisances = MarginalisedNuisances.from_columns(bare.standardised(columns))
-    likeliest = float(nuisances.most_likely(bare.standardised(bare.measured - force))[0])
-    delay = nuisance.delay_s * float(np.clip(likeliest, -LARGEST_DELAY, LARGEST_DELAY))
-    measured = bare.measured - (shown(delay) - force - delay * late)
-    return replace(bare, measured=measured, nuisances=nuisances)
+    averaged, delayed = isinstance(bare.noise, PureError), bare.delayed(shown_force(bare, damper))
+    found = replace(bare, delay_s=nuisance.delay_s)
+    for _ in range(2):  # the second with the force where the likeliest delay puts it
+        force = delayed(found.first_delay)
+        columns = np.column_stack(
+            [
+                np.full(force.size, nuisance.offset * bare.peak),
+                nuisance.gain * force,
+                _jump_columns(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+                *([] if timing is None else [timing]),
+            ]
+        )
+        found = replace(found, nuisances=MarginalisedNuisances.from_columns(bare.standardised(columns)))
+        if nuisance.delay_s > 0.0:
+            found = replace(found, first_delay=found.likeliest_delay(delayed))
+    return found
 
 
 def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> WeightedRecord:
@@ -470,10 +528,12 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
     scale = EQUAL_WEIGHT_DEVIATION * peak
     if isinstance(weighed.noise, Autoregression):
         white = Autoregression(np.zeros(0), scale**2)
-        return replace(weighed, noise=white, nuisances=MarginalisedNuisances.none(weighed.measured.size))
+        nothing = MarginalisedNuisances.none(weighed.measured.size)
+        return replace(weighed, noise=white, nuisances=nothing, delay_s=0.0)
     weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
     weights[0] /= np.sqrt(2.0)
-    return replace(weighed, weights=weights, nuisances=MarginalisedNuisances.none(2 * weights.size - 1))
+    nothing = MarginalisedNuisances.none(2 * weights.size - 1)
+    return replace(weighed, weights=weights, nuisances=nothing, delay_s=0.0)
 
 
 def _jump_columns(bends: Array) -> Array:

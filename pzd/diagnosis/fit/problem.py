@@ -62,8 +62,8 @@ class Budget:
 
 
 UNSEEN = (0.1, 1e-3)
-"""C [largest force over largest speed] and 1/k [range of displacement over largest force] below which the priors tell no
-values apart: hardly any damping, hardly any oil spring."""
+"""C [largest force over largest speed] and 1/k [range of displacement over largest force] below which the priors tell
+no values apart: hardly any damping, hardly any oil spring."""
 BOUND = 1e4
 """Limit of scaled parameters, and of the inverse of those searched by their logarithm."""
 ZERO = Parameter(
@@ -188,7 +188,7 @@ class Problem:
     def start(self) -> Array:
         """Return the (3 b,) base rows in the units of the search, see `pzd.fit.element_coordinates`."""
         rows = [self.coordinates.to_search(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in self.base]
-        return np.minimum(np.concatenate(rows), np.tile((np.inf, *self.coordinates.high[1:]), len(rows)))
+        return np.asarray(np.fmin(np.concatenate(rows), np.tile((np.inf, *self.coordinates.high[1:]), len(rows))))
 
     @cached_property
     def coordinates(self) -> ElementCoordinates:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper import parameter_rows
+from pzd.damper.compiled.kernels import K
 from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
@@ -54,7 +55,7 @@ class KernelInputs:
         Linear between nodes is k, so that along a voltage the difference of 1/k is formed where it is needed.
         """
         same_voltage = self.effective_voltage is other.effective_voltage and np.array_equal(
-            self.at_nodes[:, parameter_rows.K], other.at_nodes[:, parameter_rows.K]
+            self.at_nodes[:, K], other.at_nodes[:, K]
         )
         mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
         mine, others = _with_compliance(mine), _with_compliance(others)
@@ -75,7 +76,7 @@ class KernelInputs:
 def _with_compliance(rows: Array) -> Array:
     """Return (n, r) rows with 1/k in the place of k."""
     moved = rows.copy()
-    moved[:, parameter_rows.K] = 1.0 / rows[:, parameter_rows.K]
+    moved[:, K] = 1.0 / rows[:, K]
     return moved
 
 
@@ -144,7 +145,7 @@ def search_directions(
 
 
 def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
-    """Compute the force at the compared samples of an observation and its derivatives along some directions.
+    """Compute the force along the motion of an observation and its derivatives along some directions.
 
     The dependence of the kernel inputs on the parameters is differenced; the path integrates the derivatives exactly.
 
@@ -156,7 +157,7 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
 
     Returns
     -------
-    (n,) force [N], (n, d) slopes [N]
+    (m,) force [N] and (m, d) slopes [N] along the motion, as the channel shows them
     """
     budget.add(o.motion.time.size * (1 + len(given.pairs)))
     parallel = given.centre.parallel_force(o)
@@ -174,14 +175,13 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
     for j, change in enumerate(changes):
         slopes[:, j] += change
     if not given.centre.sensors:
-        return o.at_compared(force), o.at_compared(slopes)
+        return force, slopes
     shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
             change = o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
             shown[:, 1 + j] += change / width
-    compared = o.at_compared(shown)
-    return compared[:, 0], compared[:, 1:]
+    return shown[:, 0], shown[:, 1:]
 
 
 def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
@@ -264,9 +264,9 @@ def linearise(
     """
     residuals, forces, blocks = [], [], []
     for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        standardised = o.standardised(np.column_stack([o.measured - force, -slopes]))
+        standardised = o.residual_and_slopes(force, slopes)
         residuals.append(standardised[:, 0].copy())
-        forces.append(force)
+        forces.append(o.at_compared(force))
         blocks.append((columns, standardised[:, 1:].copy()))
     return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
 
@@ -275,13 +275,13 @@ def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> B
     """Compute the Jacobian of the force at the compared samples [N] by all variables; see `linearise`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
-    return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+    return BlockJacobian(x.size, tuple((columns, o.at_compared(slopes)) for o, columns, _, slopes in found))
 
 
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
 ) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
-    """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
+    """Yield each observation with its active variables, force (m,) and derivatives (m, columns) along its motion."""
     low, high = limits
     free = low.size
     point = problem.point(x, unknowns)

@@ -15,7 +15,7 @@ from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit import least_squares
 from pzd.diagnosis.fit.least_squares import LEVEL, FitResult
-from pzd.diagnosis.fit.likelihood import simulated_force
+from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
@@ -314,8 +314,10 @@ class _TangentSpace:
         damper = problem.point(np.concatenate([before.optimum, trace]), unknowns).damper
         if effect.name in against_nature(damper):
             return None
-        simulated = [simulated_force(o, damper) for o in problem.observations]
-        left = [o.standardised(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
+        shown = [shown_force(o, damper) for o in problem.observations]
+        simulated = [o.at_compared(f) for o, f in zip(problem.observations, shown, strict=True)]
+        pairs = zip(problem.observations, shown, strict=True)
+        left = [o.residual_and_slopes(f, np.zeros((f.size, 0)))[:, 0] for o, f in pairs]
         residual = np.concatenate(before.residuals)
         rest = least_squares.projected_out(self.before.column_basis, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
