@@ -30,9 +30,9 @@ class Difference(Frozen):
     share_of_peak: float = Field(ge=0.0)
     """In the largest force of the first state."""
     noise_N: float = Field(ge=0.0)
-    """What noise leaves in it."""
+    """What noise leaves in it, and what the model misses of tests that are compared with it."""
     left_N: float = Field(ge=0.0)
-    """What is left when all changes are allowed for."""
+    """What is left when all changes, and each test's own offset, gain and delay, are allowed for."""
     explained: float = Field(ge=0.0, le=1.0)
     """Share of its mean square above noise that the changes explain."""
 

@@ -275,8 +275,11 @@ class Findings:
     def difference(self, best: Fitted) -> Difference:
         """Return the size of the difference and of what is left of it."""
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
-        noise = float(np.mean([np.sum(c.variance) for c in self.comparisons]))
-        left = best.mean_square
+        likelihood = self.search.regression.likelihood
+        missed = [np.sum(likelihood.missed_by_model(i)) for i in range(len(self.comparisons))]
+        noise = float(np.mean([np.sum(c.variance) + m for c, m in zip(self.comparisons, missed, strict=True)]))
+        own = likelihood.own_of_tests(best.residuals, best.scatter)
+        left = float(np.mean([(r - o) @ (r - o) for r, o in zip(best.residuals, own, strict=True)]))
         explained = 1.0 - max(left - noise, 0.0) / (whole - noise) if whole > noise else 0.0
         return Difference(
             rms_N=whole**0.5,
@@ -349,7 +352,9 @@ class Findings:
         if not best.candidates:
             return []
         covariance = self.search.regression.covariance(best)
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        # A model that misses a share of the force knows how the force follows a parameter to that share.
+        missed = self.search.regression.likelihood.known_discrepancy * best.values
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:

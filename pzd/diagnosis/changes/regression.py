@@ -19,7 +19,7 @@ import numpy as np
 from pzd.diagnosis.changes.candidates import Candidate, Coordinate, Response
 from pzd.diagnosis.changes.pairs import Comparison, octave_mean, stacked
 from pzd.record import Array, Complex
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import NUISANCE_LIMIT, NuisanceConfig
 
 USUAL_SHARE = 0.3
 """Share of the priors on offset, gain and delay by which tests of one stand usually differ.
@@ -84,11 +84,30 @@ class Likelihood:
 
     def diagonal(self, at: int, scatter: Scatter) -> Array:
         """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
-        c, (difference, force) = self.comparisons[at], self._shapes[at]
-        missed = scatter.discrepancy**2 * difference
-        if c.before is None:
-            missed = missed + self.known_discrepancy**2 * force
-        return np.asarray(c.variance + missed + LEAST_VARIANCE * c.peak**2)
+        c = self.comparisons[at]
+        missed = scatter.discrepancy**2 * self._shapes[at][0]
+        return np.asarray(c.variance + missed + self.missed_by_model(at) + LEAST_VARIANCE * c.peak**2)
+
+    def missed_by_model(self, at: int) -> Array:
+        """Return (2 H + 1,) variance by what the damper of the first state misses where it stands for a test [N^2].
+
+        It misses the same in all tests, so that their number does not average it out.
+        """
+        c = self.comparisons[at]
+        if c.before is not None:
+            return np.zeros(c.difference.size)
+        alike = sum(each.before is None for each in self.comparisons)
+        return np.asarray(alike * self.known_discrepancy**2 * self._shapes[at][1])
+
+    def own_of_tests(self, residuals: Sequence[Array], scatter: Scatter) -> list[Array]:
+        """Return (2 H + 1,) what of each residual the test's own offset, gain, delay and jumps explain [N]."""
+        found = []
+        for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
+            U = np.column_stack([scatter.tests * A, self.comparisons[i].jumps])
+            weighed = U / self.diagonal(i, scatter)[:, None]
+            mean = np.linalg.solve(np.eye(U.shape[1]) + U.T @ weighed, weighed.T @ r)
+            found.append(U @ np.clip(mean, -NUISANCE_LIMIT, NUISANCE_LIMIT))
+        return found
 
     def deviance(self, residuals: Sequence[Array], scatter: Scatter) -> float:
         """Return -2 ln L of (2 H + 1,) residuals, up to a constant, with the prior on how tests differ."""

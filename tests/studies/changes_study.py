@@ -1,0 +1,215 @@
+"""How often `pzd changes` is right: pairs of states of dampers of the second generator, one changed, or the stand alone.
+
+    PYTHONPATH=. python tests/studies/changes_study.py [--pairs N] [--seed S] [--kind changed|same|stand] [--diagnose]
+
+Each pair is a damper drawn from the whole space of `pzd/blind/independent`, with one or two laws outside the library in
+both states, on sines (and triangles) at one or more values of the control signal. `changed`: one or two quantities of
+the damper change by 0.5 to 5 % of peak each, `same`: nothing, `stand`: the load cell's zero or gain, or a delay. In a
+third of the changed pairs the second state runs other motions. With `--diagnose` the first state is diagnosed, as the
+command does. A line a pair, then how many are right, ambiguous with the truth among the rivals, silent, or wrong, and
+how many intervals hold the true change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator, SeedSequence, default_rng
+
+from pzd.artefacts import Rig
+from pzd.artefacts.changes import Changes
+from pzd.blind.independent import case, stand
+from pzd.blind.independent.kernel import BinghamTable
+from pzd.blind.independent.laws import LAWS, Scale
+from pzd.blind.independent.outside import OUTSIDE
+from pzd.diagnosis.changes.comparison import changes_between, changes_between_rigs
+from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.quantities import Control
+from pzd.record import Record
+
+CAMPAIGNS = ("two_by_two", "constant_stroke", "sines_and_triangles")
+ELEMENT = ("T0", "C", "k")
+NEW = ("asymmetry", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic", "preload_offset", "relief_valve",
+       "rounded_yield", "shear_thinning", "stribeck_friction")  # fmt: skip
+SIZES = (0.005, 0.05)
+"""Least and largest change of the force (r.m.s.), as a share of peak."""
+STAND = ("load_cell_zero", "load_cell_gain", "recorder_delay")
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two states with the truth."""
+
+    before: tuple[Record, ...]
+    after: tuple[Record, ...]
+    changed: Mapping[str, Mapping[str, float]]
+    """Factors of T0, C or k, parameters of a law that is newly there, or the stand's doing."""
+    outside: tuple[str, ...]
+    equal: bool
+
+
+def pair(seed: int, index: int, kind: str) -> Pair:
+    """Draw a pair."""
+    rng = default_rng(SeedSequence(seed, spawn_key=(index, 43)))
+    run = stand.campaign(str(rng.choice(CAMPAIGNS)), rng)
+    base, actuator = BinghamTable.drawn(run.values, rng), stand.Actuator.drawn(rng)
+    equal = kind != "changed" or rng.random() < 2.0 / 3.0
+    other = run if equal else replace(
+        run, tests=tuple(replace(t, frequency=1.25 * t.frequency, amplitude=0.85 * t.amplitude) for t in run.tests)
+    )  # fmt: skip
+    phases = int(rng.integers(1 << 31))
+
+    def driven(campaign: stand.LaboratoryCampaign) -> list[stand.Driven]:
+        return [stand.driven(campaign, t, actuator, default_rng([phases, i])) for i, t in enumerate(campaign.tests)]
+
+    motions, others = driven(run), driven(other)
+    coarse = [stand.driven(run, t, actuator, default_rng([phases, i]), True) for i, t in enumerate(run.tests)]
+    plain = case.HiddenDamper(base, {}, 22.0)
+    scale = case._scale(run, base, coarse, [plain.force(m, None) for m in coarse])  # noqa: SLF001  # as the case has it
+    outside = tuple(str(n) for n in rng.choice(list(OUTSIDE), int(rng.integers(1, 3)), replace=False))
+    laws = case._sized_laws(outside, plain, coarse, scale, 1.0, rng)  # noqa: SLF001  # as the case has it
+    first = case.HiddenDamper(base, laws, 22.0)
+    names = {"changed": int(rng.integers(1, 3)), "same": 0, "stand": 0}[kind]
+    truth: dict[str, Mapping[str, float]] = {}
+    second = first
+    for name in rng.choice([*ELEMENT, *NEW], names, replace=False):
+        size = float(np.exp(rng.uniform(*np.log(SIZES))))
+        second, truth[str(name)] = _changed(second, str(name), size, coarse, scale, rng)
+    forces = [first.force(m, None) for m in motions]
+    peak = max(float(np.max(np.abs(f))) for f in forces)
+    chain = stand.Chain.drawn(rng, peak, scale.stroke, run.rate)
+    before = _records(motions, forces, chain, peak, base.values, rng)
+    after = _records(others, [second.force(m, None) for m in others], chain, peak, base.values, rng)
+    if kind == "stand":
+        name = str(rng.choice(STAND))
+        side = float(rng.choice([-1.0, 1.0]))
+        by = {"load_cell_zero": 0.05 * peak, "load_cell_gain": 0.05, "recorder_delay": 0.005}[name]
+        by *= side * float(rng.uniform(0.3, 0.95))
+        truth[name] = {name: by}
+        after = tuple(_seen(r, name, by) for r in after)
+    return Pair(before, after, truth, outside, equal)
+
+
+def _changed(
+    damper: case.HiddenDamper, name: str, size: float, motions: list[stand.Driven], scale: Scale, rng: Generator
+) -> tuple[case.HiddenDamper, Mapping[str, float]]:
+    """Return the damper in which one quantity changed by so much of the peak, and how."""
+    chance, strength, side = int(rng.integers(1 << 31)), 0.1, float(rng.choice([-1.0, 1.0]))
+    before = [damper.force(m, None) for m in motions]
+    for _ in range(8):
+        if name in ELEMENT:
+            factor = float(np.exp(side * min(strength, 1.0)))
+            row = tuple(factor * v for v in getattr(damper.base, name))
+            changed, values = replace(damper, base=replace(damper.base, **{name: row})), {"factor": factor}
+        else:
+            values = dict(LAWS[name].draw(default_rng(chance), scale, strength))
+            changed = replace(damper, laws={**damper.laws, name: values})
+        after = [changed.force(m, None) for m in motions]
+        made = np.sqrt(np.mean([np.mean((a - b) ** 2) / np.max(np.abs(b)) ** 2
+                                for a, b in zip(after, before, strict=True)]))  # fmt: skip
+        if 0.8 * size <= made <= 1.25 * size:
+            break
+        strength = min(2.0, strength * min(4.0, max(0.2, size / max(float(made), 1e-9))))
+    return changed, values
+
+
+def _records(motions, forces, chain, peak, values, rng) -> tuple[Record, ...]:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    found = []
+    for i, (m, f) in enumerate(zip(motions, forces, strict=True)):
+        t = case._logged(m, f, None, chain, peak, values, rng)  # noqa: SLF001  # as the case has it
+        v = np.gradient(t.displacement, t.time)
+        signal = None if t.signal is None else t.signal
+        found.append(Record(f"r{i:02d}", None, t.time, t.displacement, v, np.gradient(v, t.time), t.force, signal))
+    return tuple(found)
+
+
+def _seen(record: Record, name: str, by: float) -> Record:
+    if name == "load_cell_zero":
+        return replace(record, force=record.force + by)
+    if name == "load_cell_gain":
+        return replace(record, force=(1.0 + by) * record.force)
+    return replace(record, force=np.interp(record.time - by, record.time, record.force))
+
+
+def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
+    """Return how a result stands to the truth."""
+    named = {c.name for c in found.changes if c.of == "damper"}
+    of_damper = {name for name in truth if name not in STAND}
+    told = {c.name for c in found.changes} | set(found.rivals)
+    if found.verdict == "ambiguous":
+        return "ambiguous" if set(truth) <= told else "wrong"
+    if named - of_damper:
+        return "wrong" if found.verdict == "changed" else "wrong, unexplained"
+    if named == of_damper and found.verdict != "unexplained":
+        return "right"
+    return "unexplained" if found.verdict == "unexplained" else "silent"
+
+
+def held(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> Iterator[bool]:
+    """Yield of each named truth whether the interval holds the change."""
+    for c in found.changes:
+        given = truth.get(c.name, {})
+        if "factor" in given:
+            columns = (np.atleast_1d(np.array(each, dtype=float)) for each in (c.from_, c.low95, c.high95))
+            start, low, high = columns
+            yield from (bool(a <= given["factor"] * s <= b) for s, a, b in zip(start, low, high, strict=True))
+        elif c.parameter in given and isinstance(c.low95, float) and isinstance(c.high95, float):
+            yield c.low95 <= given[c.parameter] <= c.high95
+
+
+def compared(given: Pair, *, diagnosed: bool) -> Changes:
+    """Return what is found."""
+    rigs = Rig(given.before, ()), Rig(given.after, ())
+    config, control = (DiagnoseConfig(), IdentifyConfig()), Control()
+    if diagnosed:
+        return changes_between_rigs(*rigs, *config, control).changes
+    states = [State.of(n, r, identify(config[1], r, 1), None, control) for n, r in zip("ab", rigs, strict=True)]
+    return changes_between(states[0], states[1], *config, control).changes
+
+
+def _short(value: object) -> str:
+    return "/".join(f"{v:.4g}" for v in np.atleast_1d(np.array(value, dtype=float)))
+
+
+def main() -> int:
+    """Draw, compare and count."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", choices=("changed", "same", "stand"), default="changed")
+    parser.add_argument("--diagnose", action="store_true")
+    given = parser.parse_args()
+    counts: dict[bool, Counter[str]] = {True: Counter(), False: Counter()}
+    intervals: list[bool] = []
+    for index in range(given.first, given.first + given.pairs):
+        drawn, begun = pair(given.seed, index, given.kind), time.monotonic()
+        found = compared(drawn, diagnosed=given.diagnose)
+        verdict = judged(found, drawn.changed)
+        counts[drawn.equal][verdict] += 1
+        held_here = list(held(found, drawn.changed))
+        intervals += held_here
+        names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
+        truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
+        print(f"{index:4d} {'equal' if drawn.equal else 'other'} {verdict:18s} {found.verdict:11s} {truth} -> {names} "
+              f"rivals {list(found.rivals)} {100 * found.difference.share_of_peak:.2f} % held {held_here} "
+              f"outside {'+'.join(drawn.outside)} tests {len(drawn.before)} {time.monotonic() - begun:.0f} s")  # fmt: skip
+        sys.stdout.flush()
+    for equal, count in counts.items():
+        if count:
+            print(f"{'equal' if equal else 'other'} motions: {dict(count)} of {count.total()}")
+    print(f"intervals that hold: {sum(intervals)} of {len(intervals)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
