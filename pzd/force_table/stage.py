@@ -64,7 +64,8 @@ def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Con
     records = [record for record in rig.records if record.setting == setting]
     given = force.temperatures_of(diagnosed.baseline), force.voltages_of(diagnosed.baseline)
     envelope = force.operating_envelope(records, *given)
-    return _within(table, damper, _temperatures(table, damper, records), envelope, control)
+    temperatures = _temperatures(table, damper, records)
+    return _within(table, damper, temperatures, envelope, control, _reached_stroke(records))
 
 
 def untested_table(table: TableConfig, damper: Damper, control: Control) -> Table:
@@ -90,15 +91,16 @@ def _within(
     temperatures: Sequence[float | None],
     envelope: OperatingEnvelope,
     control: Control,
+    stroke: float | None = None,
 ) -> Table:
-    """Tabulate the force of a damper that is known within an envelope."""
+    """Tabulate the force of a damper that is known within an envelope, and up to a stroke where it was tested."""
     from pzd.force_table import force, lookup
 
     nodes = force.grid(table, damper, temperatures, envelope)
     notes = TableNotes(
         outside=table.outside,
         reached_m_per_s=float(np.nanmax(envelope.speeds)),
-        reached_stroke_m=_reached_stroke(records),
+        reached_stroke_m=stroke,
         lost=force.lost(damper, nodes.temperatures, nodes.velocities),
         not_monotone=force.not_monotone(damper, nodes.temperatures, nodes.velocities, control),
     )

@@ -16,7 +16,7 @@ from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, search_errors, standard_errors
-from pzd.diagnosis.fit.likelihood import simulated_force
+from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.record import Array
 from pzd.signals.measures import rms
@@ -96,7 +96,7 @@ def cancelling(problem: Problem, fitted: FitResult) -> Iterator[tuple[str, str]]
 
 def _forces(problem: Problem, damper: Damper) -> Array:
     """Simulate the compared samples (n,) of every record, each in units of its peak."""
-    return np.concatenate([simulated_force(o, damper) / o.peak for o in problem.observations])
+    return np.concatenate([o.at_compared(shown_force(o, damper)) / o.peak for o in problem.observations])
 
 
 def first_undetermined(problem: Problem, fitted: FitResult, kept: Sequence[str]) -> tuple[str, str] | None:
