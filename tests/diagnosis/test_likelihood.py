@@ -7,17 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import TWO, damper_of, sine, sines
+from synthetic import TWO, campaign_of, damper_of, sine, sines
 
 from pzd.damper.compose import respond
+from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, shown_force
+from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, jump_columns, shown_force
 from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
+from pzd.diagnosis.search.candidates import candidate
 from pzd.record import Array, Record
+from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig
 
 
@@ -88,6 +92,47 @@ def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> No
     elsewhere = np.roll(spike, 100)
     worth = [float(np.sum(one.standardised(s) ** 2)) for s in (spike, elsewhere)]
     assert worth[0] < 0.1 * worth[1]
+
+
+EVIDENCE_OF = {
+    "orifice_quadratic": ((301.0, 2720.0, 199e3), {"q": 1500.0}),
+    "rounded_yield": ((301.0, 2720.0, 199e3), {"w_s": 0.01}),
+    "stribeck_friction": ((301.0, 2720.0, 1e6), {"F_s": 40.0, "v_s": 0.03}),
+}
+"""Element and values of an effect: one that shows everywhere, at low speed, and beside a flank of a few samples."""
+
+
+@pytest.mark.parametrize("effect", EVIDENCE_OF)
+def test_evidence_is_a_band_s_and_not_a_sample_s(effect: str, rng: np.random.Generator) -> None:
+    # The same noise a hertz at every sampling rate, all of which hold the band that is compared, 80 Hz: sampling faster
+    # tells nothing that the damper did not do.
+    (friction, damping, stiffness), values = EVIDENCE_OF[effect]
+    row = BaseRow(voltage_V=0.0, T0_N=friction, C_Ns_per_m=damping, k_N_per_m=stiffness)
+    plain, true = Damper(base=(row,)), Damper(base=(row,), effects={effect: values})
+    found = []
+    for rate in (250.0, 1000.0, 8000.0):
+        noise = 0.01 * np.sqrt(rate / 1000.0)
+        tests = [sine(true, 0.0, f, 0.02, rng, noise=noise, colour=0.0, rate=rate) for f in (0.5, 1.0)]
+        campaign = cross_validation_of(campaign_of(tests), plain, 0.0025).campaign  # which sees all samples
+        whole = evidence_of(campaign, plain).whole
+        before = fit(whole, (), whole.start())
+        found.append(-candidate(whole, before, library()[effect]).delta_bic)
+    assert min(found) > 100.0
+    assert min(found) > 2.0 / 3.0 * max(found)
+
+
+def test_a_resolved_flank_is_evidence_but_for_its_instant() -> None:
+    # Thirty samples of a flank: a shift by a part of a sample explains its instant, and nothing its slope.
+    force = np.clip(np.arange(100.0) - 50.0, -15.0, 15.0) * 20.0
+    columns = jump_columns(jumps(force), force)
+    slope = np.gradient(force)
+    assert np.linalg.matrix_rank(columns) == 1
+    assert np.max(np.abs(columns)) == pytest.approx(0.29 * 20.0)
+    steeper = np.clip(1.2 * (np.arange(100.0) - 50.0), -15.0, 15.0) * 20.0 - force
+    explained = columns @ np.linalg.lstsq(columns, steeper, rcond=None)[0]
+    assert np.linalg.norm(steeper - explained) > 0.9 * np.linalg.norm(steeper)
+    shifted = 0.2 * slope
+    assert columns @ np.linalg.lstsq(columns, shifted, rcond=None)[0] == pytest.approx(shifted, abs=3.0)
 
 
 def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Generator) -> None:

@@ -557,7 +557,7 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     # The plant of the predictive control keeps an oil spring, as stiff as its step resolves.
     capped = np.minimum(rows[:, K], np.maximum(rows[:, C], 1.0) / LEAST_RELAXATION)
     rows[:, K] = np.where(fast & stiff, capped, rows[:, K])
-    rows[:, C] = np.maximum(rows[:, C], LEAST_PLASTIC_RELAXATION * rows[:, K])
+    rows[:, C] = np.where(fast & ~stiff, np.maximum(rows[:, C], LEAST_PLASTIC_RELAXATION * rows[:, K]), rows[:, C])
     drive = np.array(nodes.drive)
     if "valve_lag" not in damper.effects:
         drive[DRIVE.index(("valve_lag", "tau"))] = valve
