@@ -133,6 +133,16 @@ def test_a_worse_prediction_exceeds_two_standard_errors_at_some_voltage(rng: np.
     assert asked.worse_at(plain, at_one) == (0.0,)
 
 
+def test_a_visible_loss_over_all_tests_is_worse_even_by_chance(rng: np.random.Generator) -> None:
+    # One test of eight is missed by ten times as much, which the scatter of the differences may be: it is lost all the
+    # same to whoever drives there.
+    asked = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    plain = PredictionError(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
+    lost = replace(plain, error=np.array([10.0, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]))
+    assert not predicts_worse(lost, plain)
+    assert asked.worse_at(lost, plain) == TWO
+
+
 @pytest.mark.parametrize("tests", [2, 3, 12])
 def test_chance_alone_predicts_worse_equally_rarely_for_any_number_of_tests(
     tests: int, rng: np.random.Generator
