@@ -42,7 +42,7 @@ def test_two_settings_of_one_config_give_the_json_of_the_contract_and_a_page_bes
     assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)
     folder = tmp_path / "runs" / "damper" / "changes"
-    assert json.loads((folder / "new--aged.json").read_text(encoding="utf-8")) == printed
+    assert json.loads((folder / "new--to--aged.json").read_text(encoding="utf-8")) == printed
     assert printed.keys() == KEYS
     assert (printed["verdict"], printed["from"], printed["to"], printed["compared"]) == (
         "changed", "new", "aged", "cycles",
@@ -52,15 +52,17 @@ def test_two_settings_of_one_config_give_the_json_of_the_contract_and_a_page_bes
     assert (change["name"], change["parameter"], change["of"], change["unit"]) == ("T0", "T0", "damper", "N")
     assert change["low95"] < 330.0 + (change["from"] - 300.0) < change["high95"]
     assert printed["difference"].keys() == {"rms_N", "share_of_peak", "noise_N", "left_N", "explained"}
-    page = (folder / "new--aged.html").read_text(encoding="utf-8")
+    page = (folder / "new--to--aged.html").read_text(encoding="utf-8")
     assert "What changed from new to aged" in page
     assert "<script" not in page
     # Again, the other way round: the files of both stand beside each other, the same bytes for the same states.
-    first = (folder / "new--aged.json").read_bytes()
+    first = (folder / "new--to--aged.json").read_bytes()
     assert ran("--from", "aged", "--to", "new").returncode == 0
-    assert {path.name for path in folder.glob("*.json")} == {"new--aged.json", "aged--new.json"} | {".written.json"}
+    assert {path.name for path in folder.glob("*.json")} == {"new--to--aged.json", "aged--to--new.json"} | {
+        ".written.json"
+    }
     assert ran("--from", "new", "--to", "aged").returncode == 0
-    assert (folder / "new--aged.json").read_bytes() == first
+    assert (folder / "new--to--aged.json").read_bytes() == first
 
 
 def test_two_configs_are_two_states_and_the_files_stand_with_the_second(
@@ -75,7 +77,7 @@ def test_two_configs_are_two_states_and_the_files_stand_with_the_second(
     done = pzd_here("changes", "before.yaml", "after.yaml", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "from before to after: changed" in done.stdout
-    assert (tmp_path / "runs" / "after" / "changes" / "before--after.json").is_file()
+    assert (tmp_path / "runs" / "after" / "changes" / "before--to--after.json").is_file()
 
 
 @pytest.mark.parametrize(
