@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from pzd.blind.config import BlindConfig
-from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
 from pzd.force_table.config import TableConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.config import EngineConfig
@@ -136,6 +136,8 @@ class RunConfig(Frozen):
     """How the Bingham parameters are found."""
     diagnose: DiagnoseConfig = DiagnoseConfig()
     """How the missing effect is looked for."""
+    changes: ChangesConfig = ChangesConfig()
+    """What `pzd changes --over` lets pass."""
     table: TableConfig = TableConfig()
     """The table of force over voltage and speed."""
     simulate: SimulateConfig = SimulateConfig()

@@ -94,8 +94,29 @@ class CourseRow(_Keyed):
     low95: tuple[Numbers, ...]
     high95: tuple[Numbers, ...]
     at_voltage_V: tuple[float, ...] | None = None
+    limits: tuple[float, float] | None = None
+    """Smallest and largest value of the tolerance; None without one."""
     pass_: bool | None = Field(default=None, alias="pass")
-    """Whether every state lies within the tolerance; None where there is none, or where an interval crosses it."""
+    """Whether every state lies within the limits; None where there are none, or where an interval crosses one."""
+
+    def within(self, state: int) -> bool | None:
+        """Return whether the interval of a state lies within the limits; None where it crosses one or none is known."""
+        if self.limits is None:
+            return None
+        low, high = (_listed(column[state]) for column in (self.low95, self.high95))
+        if not low or not high:
+            return None
+        if all(self.limits[0] <= least for least in low) and all(most <= self.limits[1] for most in high):
+            return True
+        outside = [most < self.limits[0] or least > self.limits[1] for least, most in zip(low, high, strict=True)]
+        return False if any(outside) else None
+
+
+def _listed(values: Numbers) -> list[float]:
+    """Return the numbers of a value; none where one is undetermined."""
+    given = values if isinstance(values, tuple) else (values,)
+    known = [value for value in given if value is not None]
+    return known if len(known) == len(given) else []
 
 
 class Course(_Keyed):

@@ -21,11 +21,52 @@ From = Annotated[
 To = Annotated[
     str | None, typer.Option("--to", metavar="SETTING", help="The setting of the second state.", show_default=False)
 ]
+Over = Annotated[
+    str | None,
+    typer.Option(
+        "--over",
+        metavar="SETTING,...",
+        help="Follow each quantity over several settings, or over the `cycles` of the tests.",
+        show_default=False,
+    ),
+]
 
 
 @on_config("jobs", "as_json")
-def changes(call: Call, second: Second = None, before: From = None, after: To = None) -> int:
+def changes(call: Call, second: Second = None, before: From = None, after: To = None, over: Over = None) -> int:
     """Say what changed between two states of a damper: two configs, or two settings of one."""
+    if over is not None:
+        if second is not None or before is not None or after is not None:
+            raise ConfigError("pzd changes: --over names all states; leave the second config, --from and --to out")
+        return _followed(call, over)
+    return _compared(call, second, before, after)
+
+
+def _followed(call: Call, over: str) -> int:
+    from pzd.pipeline.state_comparison import comparison_name, follow_states, write_changes
+    from pzd.report.changes_page import course_page
+    from pzd.report.changes_text import course_lines
+    from pzd.schema.validate import plain_data, write_json
+
+    run = call.opened.run
+    found = follow_states(call.opened, over, call.jobs, call.output.say)
+    name = comparison_name(found.course.from_, found.course.to)
+    with run.locked("pzd changes"):
+        folder = write_changes(
+            run,
+            name,
+            {
+                "json": lambda path: write_json(path, found.course, run.control),
+                "html": lambda path: _write_text(path, course_page(found, run.control)),
+            },
+        )
+    if call.output.as_json:
+        call.output.say_json(plain_data(found.course, run.control))
+    call.output.say(*course_lines(found.course, run.control), f"page: {folder / name}.html")
+    return exit_code(found.undetermined)
+
+
+def _compared(call: Call, second: Path | None, before: str | None, after: str | None) -> int:
     from pzd.pipeline.command import opened
     from pzd.pipeline.state_comparison import Named, compare_states, comparison_name, write_changes
     from pzd.report.changes_page import changes_page

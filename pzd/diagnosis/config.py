@@ -1,12 +1,62 @@
-"""The `diagnose` block of the config."""
+"""The blocks `diagnose` and `changes` of the config."""
 
 from __future__ import annotations
 
 from pydantic import Field, field_validator, model_validator
 
+from pzd.damper.effect import ELEMENT
 from pzd.damper.effects import library
-from pzd.schema.model import Frozen
+from pzd.schema.model import Frozen, nearest
 from pzd.signals.nuisance import NuisanceConfig
+
+
+class PeakForceBand(Frozen):
+    """A point of a master curve: force at a peak velocity, with its limits."""
+
+    velocity_m_per_s: float = Field(gt=0.0)
+    """Peak velocity of a test; the force is linear between those of the tests."""
+    rebound_N: tuple[float, float]
+    """Smallest and largest force in rebound."""
+    compression_N: tuple[float, float]
+    """Smallest and largest force in compression, which is negative."""
+    voltage_V: float | None = None
+    """Control signal of the tests; empty for all."""
+
+    @field_validator("rebound_N", "compression_N")
+    @classmethod
+    def _rising(cls, limits: tuple[float, float]) -> tuple[float, float]:
+        return _rising_limits(limits)
+
+    def limits(self, direction: str) -> tuple[float, float]:
+        """Return the limits of `rebound` or `compression` [N]."""
+        return self.rebound_N if direction == "rebound" else self.compression_N
+
+
+class ChangesConfig(Frozen):
+    """What `pzd changes --over` lets pass."""
+
+    tolerance: dict[str, tuple[float, float]] = Field(default_factory=dict)
+    """Smallest and largest value by quantity: `T0`, `C`, `k`, or effect and parameter as in `gas_spring.k_g`."""
+    peak_force: tuple[PeakForceBand, ...] = ()
+    """Points of a master curve of peak force over peak velocity, each with a band."""
+
+    @field_validator("tolerance")
+    @classmethod
+    def _known_quantities(cls, tolerance: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        known = {*ELEMENT, *(f"{e.name}.{p.name}" for e in library().values() for p in e.parameters)}
+        for name, limits in tolerance.items():
+            if name not in known:
+                near = nearest(name, known)
+                hint = f"; did you mean {near}?" if near else "; name T0, C, k or effect.parameter"
+                raise ValueError(f"no quantity is called {name}{hint}")
+            _rising_limits(limits)
+        return tolerance
+
+
+def _rising_limits(limits: tuple[float, float]) -> tuple[float, float]:
+    if limits[0] > limits[1]:
+        raise ValueError(f"the first limit must be below the second (got {limits[0]:g}, {limits[1]:g})")
+    return limits
 
 
 class DiagnoseConfig(Frozen):

@@ -11,7 +11,9 @@ from pathlib import Path
 from pzd.artefacts import Identified, Rig
 from pzd.config import setting_in_use
 from pzd.diagnosis.changes.comparison import Compared, changes_between
+from pzd.diagnosis.changes.over import Followed, blocks_of_cycles, followed_over
 from pzd.diagnosis.changes.state import State, diagnosed_state
+from pzd.identification.stage import identify
 from pzd.pipeline.command import Opened, execute
 from pzd.pipeline.dependencies import setting_of
 from pzd.pipeline.execution import Say
@@ -20,6 +22,8 @@ from pzd.schema.errors import ConfigError
 
 FOLDER = "changes"
 """Of a run, with a JSON and a page for each pair of states."""
+CYCLES = "cycles"
+"""In the place of settings: the cycles of the tests are the states."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,52 @@ def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared
         return changes_between(first, second, config.diagnose, config.identify, other.run.control)
 
 
+def follow_states(given: Opened, over: str, jobs: int, say: Say) -> Followed:
+    """Follow each quantity over several settings of a config, or over the cycles of its tests.
+
+    Parameters
+    ----------
+    given : the config
+    over : settings with commas between, or `cycles`
+    jobs : processes that a stage may use
+    say : takes a line about each stage
+
+    Raises
+    ------
+    ConfigError : when fewer than two settings are named, or one is not among those of the rig
+    """
+    names = [name.strip() for name in over.split(",") if name.strip()]
+    cut = names == [CYCLES]
+    if len(set(names)) < max(len(names), 2) and not cut:
+        raise ConfigError(f"--over: needs two settings or more, each once, or `{CYCLES}` (got {over})")
+    execute(given, "identify", force=False, jobs=jobs, say=say)
+    config, control = given.config, given.run.control
+    with given.placed():
+        if cut:
+            states = _blocks(given, jobs)
+        else:
+            settings = [Named(given, name).chosen("--over") for name in names]
+            states = [
+                _state(given, name, setting, jobs, diagnosed=i == 0)
+                for i, (name, setting) in enumerate(zip(names, settings, strict=True))
+            ]
+        return followed_over(states, config.diagnose, config.identify, config.changes, control)
+
+
+def _blocks(given: Opened, jobs: int) -> list[State]:
+    """Return the states that blocks of cycles are, the first identified and diagnosed by itself."""
+    config, control = given.config, given.run.control
+    setting = Named(given, None).chosen("--over")
+    blocks = blocks_of_cycles(given.run.read(Rig, jobs), setting)
+    (name, rig), *_ = blocks
+    identified = identify(config.identify, rig, jobs)
+    first = diagnosed_state(
+        State.of(name, rig, identified, setting, control),
+        rig, identified, setting, config.diagnose, config.identify, config.rig, control, jobs,
+    )  # fmt: skip
+    return [first, *(State.of(name, rig, identified, setting, control) for name, rig in blocks[1:])]
+
+
 def _state(given: Opened, name: str, setting: str | None, jobs: int, *, diagnosed: bool) -> State:
     rig, identified, config = given.run.read(Rig, jobs), given.run.read(Identified), given.config
     state = State.of(name, rig, identified, setting, given.run.control)
@@ -115,6 +165,6 @@ def comparison_name(before: str, after: str) -> str:
     """Return the name of the files of a comparison.
 
     >>> comparison_name("gap 0.15 mm", "aged")
-    'gap_0.15_mm--aged'
+    'gap_0.15_mm--to--aged'
     """
-    return "--".join(re.sub(r"[^A-Za-z0-9._-]", "_", each) for each in (before, after))
+    return "--to--".join(re.sub(r"[^A-Za-z0-9._-]", "_", each) for each in (before, after))

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pzd.artefacts.changes import Change, Changes, Numbers, Unchanged
+from pzd.artefacts.changes import Change, Changes, Course, CourseRow, Numbers, Unchanged
 from pzd.diagnosis.changes.comparison import Compared, ComparedCycle
+from pzd.diagnosis.changes.over import Followed
 from pzd.quantities import Control
+from pzd.report import tables
 from pzd.report.blocks import (
     DASH,
     Block,
@@ -63,6 +65,48 @@ def changes_page(found: Compared, control: Control) -> str:
         sections.append(Section("trust", "Not to be trusted", (Notes(found.undetermined, "care"),)))
     title = f"What changed from {changes.from_} to {changes.to}"
     return render(title, _cards(changes), (), tuple(sections), _FOOTER)
+
+
+def course_page(found: Followed, control: Control) -> str:
+    """Write the page of several states as HTML: each quantity over the states, with its limits.
+
+    Parameters
+    ----------
+    found : the courses
+    control : the control signal, for its unit
+    """
+    course = found.course
+    with styled():
+        drawn = tuple(encoded(_course_panel(course, row, control)) for row in course.over)
+    within = {True: "Yes", False: "No", None: "Not settled, or no limits are given"}[course.pass_]
+    cards = (
+        Card("What changed?", _HEADLINES[course.verdict], sentence(course.reason)),
+        Card("Is all within the tolerance?", within, ""),
+    )
+    sections = [Section("over", "Over the states", (Gallery(drawn), tables.course(course, control).block()))]
+    if found.undetermined:
+        sections.append(Section("trust", "Not to be trusted", (Notes(found.undetermined, "care"),)))
+    return render(f"From {course.from_} to {course.to}", cards, (), tuple(sections), _FOOTER)
+
+
+def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
+    name = spelled(row.name) if row.name == row.parameter else f"{spelled(row.name)} {row.parameter}"
+    figure, ax = axes("state", f"{name} [{row.unit}]")
+    places = np.arange(len(course.states))
+    for i in range(len(row.at_voltage_V or (None,))):
+        middle, low, high = (
+            np.array([np.nan if (v := _at(each, i)) is None else v for each in column])
+            for column in (row.values, row.low95, row.high95)
+        )
+        label = amount(row.at_voltage_V[i], control.unit) if row.at_voltage_V is not None else ""
+        spread = np.maximum(np.array([middle - low, high - middle]), 0.0)
+        ax.errorbar(places, middle, spread, fmt="o-", markersize=4.0, capsize=2.0, label=label)
+    for limit in row.limits or ():
+        ax.axhline(limit, color=BASELINE, linestyle="--", linewidth=1.0)
+    ax.set_xticks(places, course.states, rotation=20.0)
+    if row.at_voltage_V is not None:
+        legend(figure)
+    return Panel(figure, name, f"{name} over the states {', '.join(course.states)}, with 95 % intervals.", "")
 
 
 def _cards(changes: Changes) -> tuple[Card, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pzd.artefacts.changes import Change, Changes, Unchanged
+    from pzd.artefacts.changes import Change, Changes, Course, Unchanged
     from pzd.quantities import Control
 
 _VERDICTS = {
@@ -42,3 +42,14 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
         at = "" if node is None else f" at {TERMINAL.amount(node, control.unit)}"
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
         yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{share}"
+
+
+def course_lines(found: Course, control: Control) -> Iterator[str]:
+    """Yield each quantity over the states as a table of the terminal."""
+    from pzd.report import tables
+
+    yield f"from {found.from_} to {found.to}: {found.verdict}; {found.reason}"
+    table = tables.course(found, control)
+    yield from (f"{table.title}:", *table.lines("  "))
+    if found.pass_ is not None:
+        yield f"all within the tolerance: {'yes' if found.pass_ else 'no'}"

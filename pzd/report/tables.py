@@ -16,6 +16,7 @@ from pzd.artefacts import (
     SettingRow,
     SummaryRow,
 )
+from pzd.artefacts.changes import Course, CourseRow
 from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow
 from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
@@ -349,6 +350,44 @@ def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
             tests = [{row.model: row for row in rows[first : first + count]} for first in range(0, len(rows), count)]
             yield Table(title, columns, tests)
     yield _peer_parameters(found.parameters, control)
+
+
+# --- changes: each quantity over the states
+
+
+def course(found: Course, control: Control) -> Table:
+    """Return each quantity over the states, a line for each state and control value."""
+    rows = [
+        (row, state, i, at)
+        for row in found.over
+        for i, state in enumerate(found.states)
+        for at in range(len(row.at_voltage_V or (None,)))
+    ]
+
+    def picked(values: Any, at: int) -> float | None:
+        picked_one: float | None = values[at] if isinstance(values, tuple) else values
+        return picked_one
+
+    def estimate(cell: tuple[CourseRow, str, int, int]) -> Estimate:
+        row, _, i, at = cell
+        return Estimate(*(picked(each[i], at) for each in (row.values, row.low95, row.high95)))
+
+    verdicts = {True: "yes", False: "no", None: None}
+    return Table(
+        "Each quantity over the states",
+        (
+            Column("quantity", "quantity", value=lambda c: _quantity(c[0])),
+            signal(control, lambda c: picked(c[0].at_voltage_V, c[3])),
+            Column("state", "state", value=lambda c: c[1]),
+            Column("value", "value", value=lambda c: Quantity(estimate(c), c[0].unit)),
+            Column("pass", "within limits", value=lambda c: verdicts[c[0].within(c[2])], optional=True),
+        ),
+        rows,
+    )
+
+
+def _quantity(row: CourseRow) -> str:
+    return row.name if row.name == row.parameter else f"{row.name} {row.parameter}"
 
 
 def _of_model(name: str, model: str, decimals: int | None = None) -> Column:

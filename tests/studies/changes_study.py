@@ -1,4 +1,4 @@
-"""How often `pzd changes` is right: pairs of states of dampers of the second generator, one changed, or the stand alone.
+"""How often `pzd changes` is right, on pairs of states of dampers of the second generator.
 
     PYTHONPATH=. python tests/studies/changes_study.py [--pairs N] [--seed S] [--kind changed|same|stand] [--diagnose]
 

@@ -102,6 +102,14 @@ def changes_between(
     ------
     DataError : when no test of the second state can be compared
     """
+    findings = findings_between(before, after, diagnose, identify, control)
+    return Compared(findings.changes(), findings.cycles(), (*before.undetermined, *after.undetermined))
+
+
+def findings_between(
+    before: State, after: State, diagnose: DiagnoseConfig, identify: IdentifyConfig, control: Control
+) -> Findings:
+    """Compare two states and search for what changed; see `changes_between`."""
     comparisons = comparisons_of(before, after, identify)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
     first = FirstState(about(before.damper, mean), max(c.peak for c in comparisons), before.scales())
@@ -111,8 +119,7 @@ def changes_between(
         regression, candidates(first, comparisons), diagnose.adopt_bic, diagnose.rival_bic, diagnose.visible
     )
     best = search.run()
-    findings = Findings(first, search, best, diagnose, control, before, after)
-    return Compared(findings.changes(), findings.cycles(), (*before.undetermined, *after.undetermined))
+    return Findings(first, search, best, diagnose, control, before, after)
 
 
 def changes_between_rigs(
@@ -347,6 +354,13 @@ class Findings:
         return candidate.name == "preload_offset" and rival == "load_cell_zero" and self._is_gas(best)
 
     # --- Tables
+
+    def refitted(self, candidates: Sequence[Candidate]) -> list[Change]:
+        """Return the quantities of some candidates fitted together, whether they changed or not."""
+        kept = [c for c in self.best.candidates if c in candidates]
+        start = [self.best.values_of(c) if c in kept else np.array(c.starts[0]) for c in candidates]
+        fitted = self.search.regression.fit(candidates, np.concatenate(start), self.best.scatter)
+        return [change for change in self._reported(fitted) if change.of == "damper"]
 
     def _reported(self, best: Fitted) -> list[Change]:
         if not best.candidates:

@@ -33,6 +33,10 @@ DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
 """Shares of the difference without a name that are tried, from nothing to all of it."""
 LEAST_VARIANCE = 1e-10
 """Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
+BEYOND_TESTED = 2.0
+"""Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
+
+Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
@@ -58,7 +62,8 @@ class Likelihood:
     comparisons: tuple[Comparison, ...]
     nuisance: NuisanceConfig
     known_discrepancy: float
-    """Share of the force that the damper of the first state misses there: of the tests compared with the model."""
+    """Share of the force that the damper of the first state misses in its own tests. It misses as much of a difference
+    that it computes, and more of motions in which it was not tested."""
 
     @cached_property
     def size(self) -> int:
@@ -85,7 +90,7 @@ class Likelihood:
     def diagonal(self, at: int, scatter: Scatter) -> Array:
         """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
         c = self.comparisons[at]
-        missed = scatter.discrepancy**2 * self._shapes[at][0]
+        missed = (scatter.discrepancy**2 + self.known_discrepancy**2) * self._shapes[at][0]
         return np.asarray(c.variance + missed + self.missed_by_model(at) + LEAST_VARIANCE * c.peak**2)
 
     def missed_by_model(self, at: int) -> Array:
@@ -97,7 +102,7 @@ class Likelihood:
         if c.before is not None:
             return np.zeros(c.difference.size)
         alike = sum(each.before is None for each in self.comparisons)
-        return np.asarray(alike * self.known_discrepancy**2 * self._shapes[at][1])
+        return np.asarray(alike * (BEYOND_TESTED * self.known_discrepancy) ** 2 * self._shapes[at][1])
 
     def own_of_tests(self, residuals: Sequence[Array], scatter: Scatter) -> list[Array]:
         """Return (2 H + 1,) what of each residual the test's own offset, gain, delay and jumps explain [N]."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
@@ -20,6 +22,7 @@ MOST_CHANGES = 4
 """Changes at once."""
 FITTED = 5
 """Candidates that are fitted in a step, of those that promise most."""
+GAIN = "load_cell_gain"
 SLACK = 30.0
 """A candidate whose promised criterion is worse than the best by more is not fitted: the promise is linearised."""
 BEAM = 2
@@ -125,27 +128,33 @@ class Search:
     # --- The steps
 
     def run(self) -> Fitted:
-        """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end."""
+        """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end.
+
+        Of ends that leave nothing visible that with the fewest changes is the best: more of them may stand in for one.
+        """
         nothing = self.nothing()
         ends = [self._without_superfluous(self._continued(self._exchanged(f))) for f in self._beginnings(nothing)]
-        return min([nothing, *ends], key=lambda f: f.bic)
+        enough = [f for f in ends if f.candidates and self._leaves_nothing(f)]
+        return min(enough or [nothing, *ends], key=lambda f: (len(f.candidates) if enough else 0, f.bic))
 
     def _beginnings(self, nothing: Fitted) -> list[Fitted]:
-        """Return the best first changes, one alone where it leaves nothing visible."""
+        """Return the best first changes; one alone where it leaves nothing visible."""
         found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
-        if found and self._left(found[0]) < self.visible:
-            return found[:1]
-        return found[:BEAM]
+        enough = [f for f in found if self._leaves_nothing(f)]
+        return enough[:1] or found[:BEAM]
 
-    def _left(self, fitted: Fitted) -> float:
-        """Return what a fit leaves above noise (r.m.s.), each test in units of its peak."""
-        pairs = zip(fitted.residuals, self.regression.comparisons, strict=True)
-        squares = [max(float(r @ r - np.sum(c.variance) - np.sum(c.jumps**2)), 0.0) / c.peak**2 for r, c in pairs]
-        return float(np.sqrt(np.mean(squares)))
+    def _leaves_nothing(self, fitted: Fitted) -> bool:
+        """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
+        own = self.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
+        squares = [
+            max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
+            for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
+        ]
+        return float(np.sqrt(np.mean(squares))) < max(self.visible, self._hidden)
 
     def _continued(self, best: Fitted) -> Fitted:
-        """Adopt changes as long as the criterion falls by enough."""
-        while len(best.candidates) < MOST_CHANGES:
+        """Adopt changes as long as something visible is left and the criterion falls by enough."""
+        while len(best.candidates) < MOST_CHANGES and not self._leaves_nothing(best):
             more = next(iter(self._additions(best)), None)
             if more is None or more.bic - best.bic > self.adopt_bic:
                 break
@@ -189,7 +198,20 @@ class Search:
         return natural and self._visible(fitted, fitted.candidates[-1])
 
     def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
-        return self.size_of(fitted, candidate) >= self.visible
+        return self.size_of(fitted, candidate) >= max(self.visible, self._hidden)
+
+    @cached_property
+    def _hidden(self) -> float:
+        """R.m.s. force below which a change may be what the model misses of others, each test in units of its peak.
+
+        A damper that misses a share of the force misses that share of a difference; of a test that it stands for, of
+        the force.
+        """
+        known, squares = self.regression.likelihood.known_discrepancy, []
+        for i, c in enumerate(self.regression.comparisons):
+            missed = float(np.sum(self.regression.likelihood.missed_by_model(i)))
+            squares.append((known**2 * float(c.difference @ c.difference) + missed) / c.peak**2)
+        return float(np.sqrt(np.mean(squares)))
 
     def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
         """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
@@ -235,4 +257,27 @@ class Search:
         limit = own.criterion + self.rival_bic + SLACK
         promising = [p for p in self._promising(less, tried, best.scatter) if p.criterion < limit][: 2 * FITTED]
         fits = [self._with(less, p) for p in promising]
+        fits += self._grouped(best, candidate)
         return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic and self._admissible(fitted)]
+
+    def _grouped(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
+        """Return the fits with several of T0, C and k in the place of a gain, and a gain in the place of several."""
+        single = {
+            c.name: c for c in reversed(self.candidates) if not c.per_voltage and c.name in (*ELEMENT_COLUMNS, GAIN)
+        }
+        others = tuple(c for c in best.candidates if c.name not in single)
+        if candidate.name == GAIN:
+            names = [n for n in ELEMENT_COLUMNS if n in single]
+            groups = [tuple(single[n] for n in group) for size in (2, 3) for group in combinations(names, size)]
+        elif candidate.name in ELEMENT_COLUMNS and sum(c.name in ELEMENT_COLUMNS for c in best.candidates) > 1:
+            groups = [(single[GAIN],), *((single[GAIN], single[n]) for n in ELEMENT_COLUMNS if n in single)]
+        else:
+            return []
+        found = []
+        for group in groups:
+            together = (*others, *group)
+            if len(together) > MOST_CHANGES or frozenset(together) == frozenset(best.candidates):
+                continue
+            start = [best.values_of(c) for c in others] + [np.zeros(len(c.coordinates)) for c in group]
+            found.append(self._fit(together, np.concatenate(start), best.scatter))
+        return found

@@ -1,0 +1,243 @@
+"""Each quantity over more than two states, all against the first: end of line, warm-up, fade, durability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.artefacts import Rig
+from pzd.artefacts.changes import Course, CourseRow, Numbers
+from pzd.diagnosis.changes.candidates import Candidate
+from pzd.diagnosis.changes.comparison import Findings, Verdict, findings_between
+from pzd.diagnosis.changes.pairs import averaged
+from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
+from pzd.identification.config import IdentifyConfig
+from pzd.quantities import Control
+from pzd.record import Record, sliced
+from pzd.schema.errors import DataError
+from pzd.signals.cycles import cycles_of
+
+ALWAYS = ("T0", "C")
+"""Quantities that are followed whether they change or not, where the tests show them."""
+MOST_BLOCKS = 8
+"""Blocks of cycles of a long test: as many points as a course needs."""
+CYCLES_OF_BLOCK = 2
+"""Fewest cycles of a block: their scatter is its noise."""
+WORST: tuple[Verdict, ...] = ("unchanged", "changed", "ambiguous", "unexplained")
+"""Verdicts in the order in which one of a pair of states decides on all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """The course of every quantity, and why it is not to be trusted."""
+
+    course: Course
+    undetermined: tuple[str, ...] = ()
+
+
+def followed_over(
+    states: Sequence[State],
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    changes: ChangesConfig,
+    control: Control,
+) -> Followed:
+    """Follow each quantity that changed in any state over all of them.
+
+    Parameters
+    ----------
+    states : in their order, each compared with the first, whose damper carries small differences of motion
+    diagnose, identify, changes : blocks of the config
+    control : the control signal, for units
+
+    Raises
+    ------
+    DataError : when a state has no test that can be compared
+    """
+    first, *later = states
+    found = [findings_between(first, state, diagnose, identify, control) for state in later]
+    results = [each.changes() for each in found]
+    keys = _followed_keys(found)
+    rows = [*_quantities(found, keys, control), *_peak_forces(states, changes)]
+    judged = [_judged(row, changes.tolerance) for row in rows]
+    passes = [row.pass_ for row in judged if _limits(row, changes.tolerance) is not None]
+    verdict = max((result.verdict for result in results), key=WORST.index)
+    same = [{(u.name, u.parameter) for u in result.unchanged} for result in results]
+    course = Course(
+        verdict=verdict,
+        from_=first.name,
+        to=later[-1].name,
+        states=tuple(state.name for state in states),
+        compared=results[-1].compared if len({r.compared for r in results}) == 1 else "both",
+        difference=results[-1].difference,
+        over=tuple(judged),
+        unchanged=tuple(u for u in results[-1].unchanged if all((u.name, u.parameter) in each for each in same)),
+        rivals=tuple(dict.fromkeys(name for result in results for name in result.rivals)),
+        reason="; ".join(
+            [f"{r.to}: {r.verdict}" for r in results] + [line for row in judged for line in _leaves(row, states)]
+        ),
+        pass_=_together(passes),
+    )
+    return Followed(course, tuple(dict.fromkeys(line for state in states for line in state.undetermined)))
+
+
+# --- The quantities
+
+
+def _followed_keys(found: Sequence[Findings]) -> set[tuple[str, str]]:
+    """Return what is followed: every quantity of the damper that changed in any state, and T0 and C."""
+    adopted = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
+    return adopted | {(name, name) for name in ALWAYS}
+
+
+def _quantities(found: Sequence[Findings], keys: set[tuple[str, str]], control: Control) -> list[CourseRow]:
+    """Return the quantities over the states, fitted together in each."""
+    values: dict[tuple[str, str], list[tuple[Numbers, Numbers, Numbers]]] = {}
+    starts: dict[tuple[str, str], tuple[Numbers, str, tuple[float, ...] | None]] = {}
+    for number, each in enumerate(found):
+        for change in each.refitted(_together_with(each, keys)):
+            key = (change.name, change.parameter)
+            if key not in values:
+                values[key] = [(None, None, None)] * number
+                starts[key] = (change.from_, control.own_unit(change.unit), change.at_voltage_V)
+            values[key].append((change.to, change.low95, change.high95))
+        for key, course in values.items():
+            if len(course) <= number:
+                values[key] = [*course, (None, None, None)]
+    rows = []
+    for key, course in values.items():
+        start, unit, at = starts[key]
+        to, low, high = zip((start, start, start), *course, strict=True)
+        rows.append(
+            CourseRow(name=key[0], parameter=key[1], unit=unit, values=to, low95=low, high95=high, at_voltage_V=at)
+        )
+    return rows
+
+
+def _together_with(found: Findings, keys: set[tuple[str, str]]) -> list[Candidate]:
+    """Return the candidates of a pair of states that are fitted together: its own, and the others that are followed."""
+    chosen = list(found.best.candidates)
+    shown = {(u.name, u.parameter) for u in found.changes().unchanged}
+    for candidate in found.search.candidates:
+        have = {key for c in chosen for key in c.key}
+        wanted = set(candidate.key) <= keys and not set(candidate.key) & have and not candidate.per_voltage
+        if wanted and (set(candidate.key) <= shown or candidate.name not in ALWAYS):
+            chosen.append(candidate)
+    return chosen
+
+
+# --- Peak force over peak velocity
+
+
+def _peak_forces(states: Sequence[State], changes: ChangesConfig) -> Iterator[CourseRow]:
+    """Yield the forces at the speeds of the tolerance, between those of the tests of each state."""
+    for band in changes.peak_force:
+        for side, name in ((1.0, "rebound"), (-1.0, "compression")):
+            forces = [_peak_force(state, band.velocity_m_per_s, side, band.voltage_V) for state in states]
+            values = tuple(None if force is None else force[0] for force in forces)
+            low = tuple(None if force is None else force[0] - force[1] for force in forces)
+            high = tuple(None if force is None else force[0] + force[1] for force in forces)
+            parameter = f"{name}_{band.velocity_m_per_s:g}_m_per_s"
+            columns: tuple[tuple[Numbers, ...], ...] = (values, low, high)
+            at = None
+            if band.voltage_V is not None:
+                at, columns = (band.voltage_V,), tuple(tuple((v,) for v in column) for column in (values, low, high))
+            yield CourseRow(
+                name="peak_force", parameter=parameter, unit="N", values=columns[0], low95=columns[1],
+                high95=columns[2], at_voltage_V=at, limits=band.limits(name),
+            )  # fmt: skip
+
+
+def _peak_force(state: State, velocity: float, side: float, voltage: float | None) -> tuple[float, float] | None:
+    """Return the force at a peak speed, linear between tests, and half its interval by noise; None beyond the tests."""
+    points = []
+    for test in averaged(state.prepared):
+        if voltage is not None and (test.voltage is None or abs(test.voltage - voltage) > 0.02 * state.voltage_scale):
+            continue
+        v, force = test.prepared.mean_motion[1], test.prepared.folded
+        at = int(np.argmax(side * v))
+        points.append((side * float(v[at]), float(np.mean(force[:, at])), float(np.std(force[:, at], ddof=1)),
+                       len(force)))  # fmt: skip
+    points.sort()
+    speeds = [p[0] for p in points]
+    if not points or not speeds[0] * 0.99 <= velocity <= speeds[-1] * 1.01:
+        return None
+    half = [1.96 * p[2] / np.sqrt(p[3]) for p in points]
+    return float(np.interp(velocity, speeds, [p[1] for p in points])), float(np.interp(velocity, speeds, half))
+
+
+# --- Tolerance
+
+
+def _limits(row: CourseRow, tolerance: Mapping[str, tuple[float, float]]) -> tuple[float, float] | None:
+    if row.limits is not None:
+        return row.limits
+    return tolerance.get(f"{row.name}.{row.parameter}") or (
+        tolerance.get(row.name) if row.name == row.parameter else None
+    )
+
+
+def _judged(row: CourseRow, tolerance: Mapping[str, tuple[float, float]]) -> CourseRow:
+    """Return the row with whether every state lies within its limits."""
+    limits = _limits(row, tolerance)
+    if limits is None:
+        return row
+    judged = row.model_copy(update={"limits": limits})
+    return judged.model_copy(update={"pass_": _together([judged.within(i) for i in range(len(row.values))])})
+
+
+def _leaves(row: CourseRow, states: Sequence[State]) -> Iterator[str]:
+    """Yield the sentence that names the first state outside the limits."""
+    outside = [state.name for i, state in enumerate(states) if row.within(i) is False]
+    if outside:
+        name = row.name if row.name == row.parameter else f"{row.name}.{row.parameter}"
+        yield f"{name} is outside its limits from {outside[0]} on"
+
+
+def _together(passes: Sequence[bool | None]) -> bool | None:
+    """Whether all pass; None where one is open and none fails, or where there is none."""
+    if False in passes:
+        return False
+    return None if None in passes or not passes else True
+
+
+# --- Blocks of cycles as states
+
+
+def blocks_of_cycles(rig: Rig, setting: str | None) -> list[tuple[str, Rig]]:
+    """Cut the cycles of every test into blocks, the n-th of all tests together a state.
+
+    Parameters
+    ----------
+    rig : the records
+    setting : of the rig's settings, the one that is cut
+
+    Returns
+    -------
+    names and records of the blocks
+
+    Raises
+    ------
+    DataError : when no test has cycles enough for two
+    """
+    records = [(r, run) for r in rig.records if r.setting == setting and (run := cycles_of(r)) is not None]
+    longest = max((run.count for _, run in records), default=0)
+    blocks = min(MOST_BLOCKS, longest // CYCLES_OF_BLOCK)
+    if blocks < 2:
+        raise DataError(
+            f"--over cycles: no test has {2 * CYCLES_OF_BLOCK} cycles that repeat (got {longest}); record a longer one"
+        )
+    long = [(record, run) for record, run in records if run.count >= CYCLES_OF_BLOCK * blocks]
+    found = []
+    for block in range(blocks):
+        parts: list[Record] = []
+        for record, run in long:
+            number, size = run.number(record.time), run.count // blocks
+            parts.append(sliced(record, (number >= block * size) & (number < (block + 1) * size)))
+        size = long[0][1].count // blocks
+        name = f"cycles {block * size + 1}-{(block + 1) * size}"
+        found.append((name, replace(rig, records=tuple(parts), entries=())))
+    return found
