@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+*/-].*?)\s*")
-_IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
+_IN_BRACKETS = re.compile(r"[\[(\uff08\u3010]\s*([^\[\]()\uff08\uff09\u3010\u3011]+?)\s*[\])\uff09\u3011]\s*$")
 _LOGGERS = {
     "Sec": "s",
     "sec": "s",
