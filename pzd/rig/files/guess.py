@@ -495,10 +495,7 @@ def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str
     if TIME not in columns and _FREQUENCY.search(heads[0]) and FORCE not in columns:
         return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
     if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
-        return (
-            "a curve of force over velocity, and no recording over time: in Python "
-            "pzd.Damper.from_curve(velocity, force) takes it"
-        )
+        return "a curve of force over velocity, and no recording over time: a test needs time, displacement and force"
     accelerations = [
         head for head in heads if unit_of(_accelerated(head), file.unit_below(head), ACCELERATION) is not None
     ]
