@@ -132,7 +132,8 @@ class FilesEntry(Frozen):
     rate_Hz: float | None = Field(default=None, gt=0.0)
     """Samples a second of files in which no column holds the time; each recording begins at 0."""
     units: dict[str, Unit] = Field(default={})
-    """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`).
+    """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`), also about
+    the reading that means zero (`-200 N/V about 2.5 V`, `-200 N/V about the mean of the first 10`).
     For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""
     constants: dict[str, WithUnit] = Field(default={})
     """Quantity -> value with unit (`100 V`) that no column holds."""

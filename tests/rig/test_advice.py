@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write
 
+from pzd.config import load
+from pzd.quantities import Control
 from pzd.rig.files.guess import guessed
+from pzd.rig.stage import ingest
 from pzd.schema.errors import DataError, UserError
 
 # ---------------------------------------------------------------- columns and headers
@@ -33,11 +36,25 @@ def test_a_file_without_headers_is_told_how_to_name_its_columns(tmp_path: Path) 
     assert "a.csv:1: numbers stand where the headers should" in said
     header = re.findall(r"header: \[(.*?)\]", said)[0].split(", ")
     assert np.abs(run(tmp_path, {"path": "a.csv", "header": header}).records[0].force - FORCE).max() < 1e-5
-    with pytest.raises(DataError) as caught:
-        guessed([tmp_path / "a.csv"])
-    (line,) = re.findall("headers above them, e.g. (.*?);", caught.value.messages[0])
-    write(tmp_path / "a.csv", [line.replace(", ", ",") + ",more", *rows])
-    assert run(tmp_path).records[0].time.size == TIME.size
+    # `pzd init` shows the range of each, so that one sees which is which.
+    proposed = guessed([tmp_path / "a.csv"])
+    assert (
+        "      header: [column1, column2, column3, column4]    # the file has none: these names are made up" in proposed
+    )
+    assert any(re.fullmatch(r" *# column2: -0.01 to 0.01, turns \d+ times", one) for one in proposed)
+    assert "        time: column1" in proposed
+    filled = "\n".join(proposed)
+    for empty, answer in (
+        ("displacement:   # fill in: one of", "displacement: column2 #"),
+        ("force:   # fill in: one of the others", "force: column3 #"),
+        ("time:   # fill in: column1", "time: s #"),
+        ("displacement:   # fill in: the unit", "displacement: m #"),
+        ("force:   # fill in: the unit", "force: N #"),
+    ):
+        assert empty in filled
+        filled = filled.replace(empty, answer)
+    (tmp_path / "own.yaml").write_text(filled.replace("# car", "car"), encoding="utf-8")
+    assert np.abs(ingest(load(tmp_path / "own.yaml").rig, Control(), tmp_path).records[0].force - FORCE).max() < 1e-5
 
 
 @pytest.mark.parametrize("heads", [("Time [s]", "Pos [mm]"), ("Time [s]", "Pos [mm]", "")])
@@ -53,8 +70,9 @@ def test_without_force_no_damper(tmp_path: Path, heads: tuple[str, ...]) -> None
 def test_what_is_asked_to_be_filled_in_has_candidates(tmp_path: Path) -> None:
     """A load cell recorded in volts was taken for the control, and nothing was left to choose the force from."""
     write(tmp_path / "a.csv", lines({"Time [s]": TIME, "Pos [mm]": X * 1e3, "Voltage [V]": FORCE}))
-    (asked,) = [line for line in guessed([tmp_path / "a.csv"]) if line.startswith("        force:")]
-    assert asked == "        force:   # fill in: one of Voltage [V]"
+    column, unit = [line for line in guessed([tmp_path / "a.csv"]) if line.startswith("        force:")]
+    assert column == "        force:   # fill in: one of Voltage [V]"
+    assert unit == "        force:   # fill in: the unit of that column, e.g. N"
     entry = {
         "path": "a.csv",
         "columns": {"time": "Time [s]", "displacement": "Pos [mm]", "force": "Voltage [V]"},

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from written_files import FORCE, TIME, X
+from written_files import FORCE, TIME, X, lines, write
 
 from pzd.artefacts import Rig
 from pzd.config import load
+from pzd.quantities import Control
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import ConfigError, DataError
@@ -243,3 +244,93 @@ def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_
     assert not load(tmp_path / "guess.yaml").car
     driven = stored(tmp_path / "b_100V.csv", ["time_s,displacement_m,force_N"], columns, ",")
     assert "# car: false" not in guessed([driven])
+
+
+# ---------------------------------------------------------------- headers of the world, and what is no test
+
+
+WORLD = {
+    "gbk": ["时间(s)", "位移(mm)", "阻尼力(N)", "电压(V)"],
+    "shift_jis": ["時間[s]", "変位[mm]", "荷重[N]", "電圧[V]"],
+    "utf-16": ["时间\uff08s\uff09", "行程\uff08mm\uff09", "力\uff08N\uff09", "电压\uff08V\uff09"],
+    "latin-1": ["Temps (s)", "Déplacement (mm)", "Effort amortisseur (N)", "Tension à la vanne (V)"],
+    "cp1250": ["Czas [s]", "Przemieszczenie [mm]", "Siła [N]", "Napięcie [V]"],
+    "utf-8": ["Tempo [s]", "Spostamento [mm]", "Forza [N]", "Tensione [V]"],
+    "cp1252": ["Tiempo [s]", "Desplazamiento [mm]", "Fuerza máxima [N]", "Tensión [V]"],
+    "iso8859-15": ["Zeit [s]", "Kolbenweg [mm]", "Dämpferkraft [N]", "Spannung [V]"],
+}
+
+
+@pytest.mark.parametrize("encoding", WORLD)
+def test_headers_of_the_world_are_known_in_their_code_pages(
+    tmp_path: Path, encoding: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    columns = dict(zip(WORLD[encoding], (TIME, 1e3 * X, FORCE, np.full(TIME.size, 2.0)), strict=True))
+    write(tmp_path / "a.csv", lines(columns, ";", ","), encoding)
+    text = "\n".join(guessed([Path("a.csv")]))
+    assert "fill in" not in text
+    Path("own.yaml").write_text(text, encoding="utf-8")
+    (entry,) = ingest(load(Path("own.yaml")).rig, Control(), tmp_path).entries
+    assert entry.voltage_V == 2.0
+    assert entry.force_rms_N == pytest.approx(np.std(FORCE), rel=1e-6)
+
+
+def world_of(tmp_path: Path, rows: list[str]) -> str:
+    write(tmp_path / "a.csv", rows)
+    with pytest.raises(DataError) as caught:
+        guessed([tmp_path / "a.csv"])
+    return caught.value.messages[0]
+
+
+def test_a_file_that_is_no_test_of_a_damper_is_told_what_it_is(tmp_path: Path) -> None:
+    ride = {"Time [s]": TIME, "ax [g]": X, "ay [g]": X, "az [g]": X}
+    assert "accelerations of a ride, and no test of a damper: pzd rate rates them" in world_of(tmp_path, lines(ride))
+    v = np.linspace(-1.0, 1.0, 21)
+    curve = {"Velocity [m/s]": v, "Force [N]": 900.0 * v}
+    assert "a curve of force over velocity, and no recording over time" in world_of(tmp_path, lines(curve))
+    bands = {"Frequency [Hz]": np.geomspace(1.0, 80.0, 20), "a [m/s2]": np.full(20, 0.2)}
+    assert "levels over frequency, as of third octaves" in world_of(tmp_path, lines(bands))
+    telemetry = {"Time [s]": TIME, "Damper Pos FL [mm]": X, "Damper Pos FR [mm]": X, "Speed [km/h]": X}
+    assert "without force no damper: this file has Time [s], Damper Pos FL [mm]" in world_of(tmp_path, lines(telemetry))
+
+
+def test_no_column_is_offered_for_two_quantities_and_units_are_asked_in_the_same_round(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines({"Time [s]": TIME, "Kanal 1": X, "Kanal 2": FORCE}))
+    said = guessed([tmp_path / "a.csv"])
+    assert "        displacement:   # fill in: one of Kanal 1, Kanal 2" in said
+    assert "        force:   # fill in: one of the others of these" in said
+    assert "        displacement:   # fill in: the unit of that column, e.g. mm" in said
+    assert "        force:   # fill in: the unit of that column, e.g. N" in said
+
+
+def motec(rows: list[str]) -> list[str]:
+    """As MoTeC i2 writes CSV: a preamble of quoted pairs, headers, units, an empty line, quoted numbers."""
+    return [
+        '"Format","MoTeC CSV File",,,"Workbook","Damper"',
+        '"Vehicle","Rig 3",,,"Worksheet","Loops"',
+        '"Sample Rate","500.000","Hz",,"End Time","1.0","s"',
+        "",
+        '"Time","Damper Pos","Damper Force"',
+        '"s","mm","N"',
+        "",
+        *(",".join(f'"{cell}"' for cell in row.split(",")) for row in rows),
+    ]
+
+
+def test_csv_of_motec_i2_and_quoted_decimal_commas_are_read_as_they_are_guessed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = lines({"t": TIME, "x": 1e3 * X, "F": FORCE})[1:]
+    write(Path("motec.csv"), motec(rows))
+    comma = [",".join(f'"{cell}"'.replace(".", ",") for cell in row.split(",")) for row in rows]
+    write(Path("comma.csv"), ['"Zeit [s]","Weg [mm]","Kraft [N]"', *comma])
+    write(Path("trail.csv"), ["Time [s],Pos [mm],Load [N]", *(r + "," * (n % 3 == 0) for n, r in enumerate(rows))])
+    for name in ("motec", "comma", "trail"):
+        text = "\n".join(guessed([Path(f"{name}.csv")]))
+        assert "fill in" not in text
+        Path("own.yaml").write_text(text.replace("# car", "car"), encoding="utf-8")
+        (record,) = ingest(load(Path("own.yaml")).rig, Control(), tmp_path).records
+        assert record.displacement == pytest.approx(X, abs=1e-9)
+        assert record.force == pytest.approx(FORCE, abs=1e-5)

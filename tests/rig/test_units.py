@@ -122,3 +122,41 @@ def test_inches_in_quotes_or_as_a_quote_are_guessed_and_read_back(tmp_path: Path
     config = load(tmp_path / "guess.yaml")
     (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
     assert np.abs(record.displacement - X).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("unit", "zero", "volts_of"),
+    [
+        ("-200 N/V about the mean of the first 10", 2.5, 1.0),
+        ("-200 N/V about 2.5 V", 2.5, 1.0),
+        ("-0.2 kN/V about 2.5", 2.5, 1.0),
+        ("-0.2 N/mV about 2500 mV", 2500.0, 1e3),
+        ("-20.394324 kgf/V about the mean of the first 50", 0.31, 1.0),
+    ],
+)
+def test_volts_with_a_calibration_and_a_zero_are_read_as_newtons(
+    tmp_path: Path, unit: str, zero: float, volts_of: float
+) -> None:
+    """The rod stands still at first, so that the cell shows its zero."""
+    time = np.arange(TIME.size + 60) * 2e-3
+    x, force = (np.concatenate((np.zeros(60), values)) for values in (X, FORCE))
+    write(tmp_path / "a.csv", lines({"time_s": time, "displacement_m": x, "Load": zero - volts_of * force / 200.0}))
+    entry = {"path": "a.csv", "columns": {"force": "Load"}, "units": {"force": unit}}
+    rig = run(tmp_path, entry)
+    assert rig.records[0].force == pytest.approx(force, abs=2e-3)
+    assert any(row.step == "unit" and row.was == unit for row in rig.ingested)
+
+
+@pytest.mark.parametrize("unit", ["200 N/V about the mean of the first 0", "200 N/V about", "about 2 V", "200 N/A"])
+def test_a_calibration_that_means_nothing_is_refused(tmp_path: Path, unit: str) -> None:
+    write(tmp_path / "a.csv", lines({"time_s": TIME, "displacement_m": X, "Load": FORCE}))
+    (said,) = wrong(tmp_path, {"path": "a.csv", "columns": {"force": "Load"}, "units": {"force": unit}})
+    assert "rig.files.0.units: force:" in said
+
+
+@pytest.mark.parametrize(
+    ("unit", "newtons"),
+    [("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605), ("daN", 10.0), ("kip", 4448.2216)],
+)
+def test_forces_of_the_trade(unit: str, newtons: float) -> None:
+    assert to_canonical(np.array([2.0]), unit, LOAD) == pytest.approx([2.0 * newtons], rel=1e-7)

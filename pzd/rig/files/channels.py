@@ -148,10 +148,7 @@ def _steps(
         if source.dated:
             yield ReadingStep("unit", own.name, f"dates and times like {source.unit}", "s since the first")
         elif source.unit != own.unit:
-            start, end = to_canonical(np.array([0.0, 1.0]), source.unit, own)
-            offset = f" {start:+.10g}" if start else ""
-            if offset or end != 1.0:
-                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {end - start:.10g}{offset}")
+            yield from _conversion(source.unit, own)
         if spec.quantity in held:
             every = f"{held[spec.quantity]} of {sheet.rows} cells filled"
             yield ReadingStep("value", own.name, every, "held from each to the next")
@@ -159,6 +156,17 @@ def _steps(
             yield ReadingStep("sign", own.name, "as recorded", "times -1")
     if layout.entry.rate_Hz is not None:
         yield ReadingStep("clock", TIME.name, "no column", f"samples counted at {layout.entry.rate_Hz:.10g} Hz")
+
+
+def _conversion(unit: str, own: Quantity) -> Iterator[ReadingStep]:
+    """Report a conversion that changes the numbers, by its factor and offset."""
+    if " about the mean " in unit:
+        yield ReadingStep("unit", own.name, unit, own.unit)
+        return
+    start, end = to_canonical(np.array([0.0, 1.0]), unit, own)
+    offset = f" {start:+.10g}" if start else ""
+    if offset or end != 1.0:
+        yield ReadingStep("unit", own.name, unit, f"{own.unit}: times {end - start:.10g}{offset}")
 
 
 def _is_sparse(cells: Array, starts: tuple[int, ...]) -> bool:
@@ -204,7 +212,8 @@ def _other_units(source: _Source, sheet: Sheet) -> Iterator[tuple[str, float]]:
     beside = sheet.units[source.column].strip("[]() ") if sheet.units else ""
     for unit, shown in ((inside, ""), (beside, f" and its unit {beside!r}")):
         try:
-            theirs, ours = (to_canonical(np.ones(1), one, spec.own) for one in (unit or source.unit, source.unit))
+            pair = (unit or source.unit, source.unit)
+            theirs, ours = (np.diff(to_canonical(np.arange(2.0), one, spec.own)) for one in pair)
         except UnitError:
             continue
         ratio = float(theirs[0]) / float(ours[0])

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
+from pzd.quantities import (
+    ACCELERATION,
+    DISPLACEMENT,
+    FORCE,
+    TEMPERATURE,
+    TIME,
+    VELOCITY,
+    VOLTAGE,
+    Control,
+    Quantity,
+)
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
@@ -30,7 +40,7 @@ from pzd.rig.files.sniffing import (
     unit_of,
     value_in_names,
 )
-from pzd.rig.files.units import factor_in
+from pzd.rig.files.units import factor_in, in_header
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.measures import work
@@ -123,12 +133,17 @@ class SniffedFile:
     form: str
     """Name of its format."""
 
+    def unit_below(self, head: str) -> str | None:
+        """Return what the row of units says of a column; None where there is none."""
+        units = self.dialect.units
+        return units[self.dialect.header.index(head)] if units else None
+
     @property
     def layout(self) -> tuple[object, ...]:
         """Key that is equal for files that one entry can read."""
         d = self.dialect
         kind = [_date_format(cell) for cell in d.first]
-        return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
+        return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, d.headless, tuple(kind)
 
 
 def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
@@ -152,9 +167,11 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
     for group in groups.values():
         for path, members in _patterns([file.path for file in group]):
             mine = [file for file in group if file.path in members]
-            columns = assigned(mine[0].dialect.header, mine[0].dialect.units, control)
+            d = mine[0].dialect
+            columns = dict(mine[0].columns) if d.headless else assigned(d.header, d.units, control)
             pattern, units = _from_names(mine, columns, control)
             lines = [f"    - path: {written(path)}"]
+            lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units)]
             controlled = VOLTAGE in columns or control.name in units
             yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file.path) for file in mine))
@@ -192,10 +209,9 @@ def _keys(
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        left = ", ".join(_left(dialect.header, columns))
-        counted = "; or say rate_Hz: N instead, where no column holds it"
-        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in missing)
+        yield from _asked_columns(files[0], columns, missing)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
+    units += list(_asked_units(files[0], columns, missing))
     if units:
         yield "units:"
         yield from units
@@ -206,11 +222,47 @@ def _keys(
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
-def _left(header: Sequence[str], columns: dict[Quantity, str]) -> list[str]:
-    """Return the headers that may hold what is missing: of no quantity, else of one that a file may go without."""
-    filled = [head for head in header if head.strip()]
-    free = [head for head in filled if head not in columns.values()]
-    return free or [head for head in filled if head not in [columns.get(quantity) for quantity in NEEDED]]
+def _asked_columns(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:
+    """Write the empty places of columns that only a person knows, each with those that may stand there."""
+    offered: list[list[str]] = []
+    for quantity in missing:
+        free = _candidates(file, columns, quantity)
+        counted = "; or say rate_Hz: N instead, where no column holds it" if quantity is TIME else ""
+        if free in offered:
+            yield f"  {quantity.name}:   # fill in: one of the others of these{counted}"
+        else:
+            yield f"  {quantity.name}:   # fill in: one of {', '.join(free) or 'none that is seen'}{counted}"
+        offered.append(free)
+
+
+def _asked_units(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:
+    """Write the empty places of units of columns that are asked for, where their headers name none."""
+    for quantity in missing:
+        heads = [(head, file.unit_below(head)) for head in _candidates(file, columns, quantity)]
+        if heads and any(unit_of(head, below, quantity) is None for head, below in heads):
+            yield f"  {quantity.name}:   # fill in: the unit of that column, e.g. {_OFTEN[quantity]}"
+
+
+_OFTEN = {TIME: "s", DISPLACEMENT: "mm", FORCE: "N"}
+"""Units of rigs, mostly."""
+
+
+def _candidates(file: SniffedFile, columns: dict[Quantity, str], quantity: Quantity) -> list[str]:
+    """Return the headers that may hold a quantity: in a unit of it, in none, or in one of the recorder."""
+    filled = [head for head in file.dialect.header if head.strip()]
+    may = [head for head in filled if _may_hold(head, file.unit_below(head), quantity)]
+    free = [head for head in may if head not in columns.values()]
+    # Else one of a quantity that a file may go without: a load cell in volts looks like a control signal.
+    return free or [head for head in may if head not in [columns.get(needed) for needed in NEEDED]]
+
+
+def _may_hold(head: str, below: str | None, quantity: Quantity) -> bool:
+    unit = below.strip("[]() ") if below and below.strip("[]() ") else in_header(head, quantity)
+    return not unit or unit in _RECORDER or unit_of(head, below, quantity) is not None
+
+
+_RECORDER = ("V", "mV", "Volts", "count", "counts", "bit", "digit", "-", "%")
+"""Units of a recorder, of which one stands for so much of the quantity."""
 
 
 def _rate(file: SniffedFile) -> float | None:
@@ -241,8 +293,10 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield f"encoding: {dialect.encoding}"
     if dialect.skip:
         yield f"skip: {dialect.skip}"
-    if dialect.separator == " ":
-        yield 'separator: " "'
+    if dialect.separator in (" ", dialect.decimal):
+        yield f'separator: "{dialect.separator}"'
+    if dialect.headless:
+        yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
     if dialect.decimal == "," and any("," in cell for cell in dialect.first):
         yield "decimal: ','"
     if dialect.units_row:
@@ -259,10 +313,19 @@ def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
         if dated is not None:
             yield f"  time: '{dated}'"
         elif unit is None:
-            lacks = "names a factor: what one recorded unit stands for" if factor_in(column) else "names no unit"
-            yield f"  {quantity.name}:   # fill in: {column} {lacks}, e.g. {quantity.unit}"
+            yield f"  {quantity.name}:   # fill in: {column} {_lacking(column, below, quantity)}"
         elif not _read_alike(column, below, unit):
             yield f"  {quantity.name}: {written(unit)}"
+
+
+def _lacking(column: str, below: str | None, quantity: Quantity) -> str:
+    """Say what a column lacks to be read."""
+    recorded = below.strip("[]() ") if below and below.strip("[]() ") else in_header(column, quantity)
+    if recorded in _RECORDER:
+        return f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}"
+    if factor_in(column):
+        return f"names a factor: what one recorded unit stands for, e.g. {quantity.unit}"
+    return f"names no unit, e.g. {quantity.unit}"
 
 
 def _read_alike(column: str, below: str | None, unit: str) -> bool:
@@ -300,6 +363,8 @@ def _events(file: SniffedFile) -> Iterator[str]:
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
     dialect = file.dialect
     options: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
+    if dialect.headless:
+        options["header"] = dialect.header
     if file.form == TEXT:
         options |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
     return FilesEntry(path=str(file.path), split=split, **options)
@@ -399,15 +464,66 @@ def _control(files: Sequence[SniffedFile]) -> Control:
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
+    file = SniffedFile(path, dialect, tuple(columns.items()), form)
+    if dialect.headless:
+        return replace(file, columns=tuple(_by_values(file).items()))
     line = dialect.header_line if form == TEXT else None
-    lacking = [quantity.name for quantity in (DISPLACEMENT, FORCE) if quantity not in columns]
-    if columns and lacking and not _left(dialect.header, columns):
-        here = ", ".join(head for head in dialect.header if head.strip())
-        raise DataError(f"{at(path, line)}: without {' and '.join(lacking)} no damper: this file has {here}")
-    if not columns and all(re.fullmatch(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?|", head) for head in dialect.header):
-        names = "write a line of headers above them, e.g. time_s, displacement_m, force_N"
-        raise DataError(f"{at(path, line)}: numbers stand where the headers should; {names}")
+    here = ", ".join(head for head in dialect.header if head.strip())
+    what = _no_test_of_a_damper(file, columns)
+    if what is not None:
+        raise DataError(f"{at(path, line)}: {what} (got {here})")
     if not columns:
         shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
         raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
-    return SniffedFile(path, dialect, tuple(columns.items()), form)
+    lacking = [q for q in (DISPLACEMENT, FORCE) if q not in columns]
+    if any(not _candidates(file, columns, q) for q in lacking):
+        raise DataError(
+            f"{at(path, line)}: without {' and '.join(q.name for q in lacking)} no damper: this file has {here}"
+        )
+    return file
+
+
+# --- What a file is that holds no test of a damper ---
+
+_FREQUENCY = re.compile(r"freq|^f ?[\[(]|hertz|terz|third|octave|\bHz\b", re.IGNORECASE)
+"""Headers of a column of frequencies."""
+
+
+def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str | None:
+    """Say what a file is that holds no recording of force and displacement, and what reads it; None where it may."""
+    heads = [head for head in file.dialect.header if head.strip()]
+    if TIME not in columns and _FREQUENCY.search(heads[0]) and FORCE not in columns:
+        return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
+    if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
+        return "a curve of force over velocity, and no recording over time: a test needs time, displacement and force"
+    accelerations = [
+        head for head in heads if unit_of(_accelerated(head), file.unit_below(head), ACCELERATION) is not None
+    ]
+    if accelerations and FORCE not in columns and DISPLACEMENT not in columns:
+        return "accelerations of a ride, and no test of a damper: pzd rate rates them"
+    return None
+
+
+def _accelerated(head: str) -> str:
+    """Return a header with g as the acceleration of gravity, which elsewhere is a gram."""
+    return re.sub(r"[\[(]\s*g\s*[\])]\s*$", "[standard_gravity]", head)
+
+
+def _by_values(file: SniffedFile) -> dict[Quantity, str]:
+    """Tell the clock of a table without headers: the one column that rises evenly."""
+    sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset(file.dialect.header)), "rig.files")
+    rising = [
+        sheet.header[column]
+        for column, values in sheet.numbers.items()
+        if values.size > 2 and np.all(np.diff(values) > 0.0) and np.ptp(np.diff(values)) < 0.5 * np.diff(values).mean()
+    ]
+    return {TIME: rising[0]} if rising else {}
+
+
+def _ranges(file: SniffedFile) -> Iterator[str]:
+    """Write the range of every column of a table without headers, so that one sees which is which."""
+    sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset(file.dialect.header)), "rig.files")
+    for column, values in sheet.numbers.items():
+        turns = int(np.count_nonzero(np.diff(np.sign(np.diff(values))) != 0))
+        course = "rises evenly" if turns == 0 and values[-1] > values[0] else f"turns {turns} times"
+        yield f"# {sheet.header[column]}: {np.nanmin(values):.4g} to {np.nanmax(values):.4g}, {course}"

@@ -6,6 +6,7 @@ Only for the guess of a config: a run reads files by its config.
 from __future__ import annotations
 
 import codecs
+import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -37,21 +38,24 @@ from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 
-# --- Quantity of a column, by its header in English, German, French or Spanish ---
+# --- Quantity of a column, by its header in English, German, French, Spanish, Italian, Polish, Chinese or Japanese ---
 
 _LOOKS_LIKE = {
-    TIME: r"^t$|^tout$|^x_value$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
-    DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
-    VELOCITY: r"^v$|vel|speed|geschw|vitesse",
-    ACCELERATION: r"^a$|acc|beschl|acel",
-    FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga",
-    TEMPERATURE: r"temp(?!s\b)|t[eé]mp[eé]r",
-    PRESSURE: r"^p$|press|druck|presi",
+    TIME: r"^t$|^tout$|^x_value$|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
+    r"|\u65f6\u95f4|\u6642\u9593",
+    DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera"
+    r"|spostament|corsa|przemieszcz|^skok|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
+    VELOCITY: r"^v$|vel|speed|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6",
+    ACCELERATION: r"^a$|acc|beschl|acel|przyspiesz|\u52a0\u901f\u5ea6",
+    FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga|forza|carico|^si[lł]a|(?<![\u538b\u5727])\u529b"
+    r"|\u8f7d\u8377|\u8377\u91cd|\u8d1f\u8377",
+    TEMPERATURE: r"temp(?!s\b|o\b)|t[eé]mp[eé]r|\u6e29\u5ea6|\u6eab\u5ea6",
+    PRESSURE: r"^p$|press|druck|presi|ci[sś]nieni|\u538b\u529b|\u5727\u529b",
 }
 """Headers of each quantity, without a unit in brackets."""
 CONTROLS = {
-    Control(): r"^u$|volt|spannung|tension|tensi[oó]n",
-    Control("current", "A"): r"^i$|current|strom|courant|corriente",
+    Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|\u7535\u538b|\u96fb\u5727",
+    Control("current", "A"): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41",
 }
 """Headers of the control signal."""
 _WITH_UNIT = {
@@ -155,7 +159,7 @@ def _in_brackets(header: str, units: Sequence[str] | None, index: int) -> bool:
 
 
 def _bare(header: str) -> str:
-    return re.sub(r"[\[(].*", "", header).strip().lower()
+    return re.sub(r"[\[(\uff08\u3010].*", "", header).strip().lower()
 
 
 # --- Values in the name of a file: control signal, temperature, position of the clickers ---
@@ -237,6 +241,8 @@ class Dialect:
     """Lines above the header."""
     units_row: bool = False
     """Whether the units are in a row below the header."""
+    headless: bool = False
+    """Whether the file has no headers; those here are made up."""
 
     @property
     def header_line(self) -> int:
@@ -281,13 +287,27 @@ def sniffed(path: Path) -> Dialect | None:
     DataError : when it is a file of another kind
     """
     raw = text_bytes(path)
-    encoding = _encoding(raw)
+    found = [dialect for encoding in _encodings(raw) if (dialect := _sniffed_as(raw, encoding)) is not None]
+    return max(found, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))) if found else None
+
+
+def _sniffed_as(raw: bytes, encoding: str) -> Dialect | None:
+    """Guess the dialect of a text in an encoding."""
     text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")[:MOST_LINES]
-    readings = [(separator, decimal) for separator in (*SEPARATORS, BLANKS) for decimal in ".," if separator != decimal]
-    tables = [_table([fields_of(line, reading[0]) for line in lines], encoding, *reading) for reading in readings]
+    # In quotes a decimal comma may stand between separating ones.
+    quoted = any('","' in line for line in lines)
+    readings = [(s, d) for s in (*SEPARATORS, BLANKS) for d in ".," if s != d or quoted]
+    tables = [_table([_fields(line, reading[0]) for line in lines], encoding, *reading) for reading in readings]
     found = [table for table in tables if table is not None]
     return max(found, key=lambda rated: rated[0])[1] if found else None
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    """Split a line into its fields, separators in quotes left alone."""
+    if '"' not in line or separator == BLANKS:
+        return fields_of(line, separator)
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
 
 
 def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
@@ -297,14 +317,23 @@ def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
     return found[1] if found else None
 
 
-def _encoding(raw: bytes) -> str:
+_CODE_PAGES = ("latin-1", "cp1250", "gbk", "shift_jis")
+"""Encodings that are tried where a text is neither UTF-8 nor UTF-16; the one in which most headers mean something."""
+
+
+def _encodings(raw: bytes) -> tuple[str, ...]:
+    """Return the encodings that a text may be in."""
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "utf-16"
+        return ("utf-16",)
+    return tuple(page for page in _CODE_PAGES if _reads(raw, page)) if not _reads(raw, "utf-8") else ("utf-8",)
+
+
+def _reads(raw: bytes, encoding: str) -> bool:
     try:
-        raw.decode("utf-8")
+        raw.decode(encoding)
     except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8"
+        return False
+    return True
 
 
 def _table(
@@ -317,10 +346,27 @@ def _table(
     # A line of the preamble, say one of a date, may hold numbers too, but it is narrower than the table.
     usual = Counter(len(rows[n]) for n in data).most_common(1)[0][0] if data else 0
     data = [n for n in data if len(rows[n]) >= usual]
-    if not data or data[0] == 0:
+    if not data:
         return None
     first = data[0]
+    if first == 0:
+        return _headless(rows, data, numbers, encoding, separator, decimal)
     width = len(rows[first])
+    above = [n for n in range(first) if any(rows[n])][-2:]  # empty lines may stand between head and rows
+    if not above:
+        return None
+    if above[-1] != first - 1:
+        rows = [*rows[: above[-1] + 1], *rows[first:]]
+        first = above[-1] + 1
+        data = [
+            n
+            for n in range(first, len(rows))
+            if len(rows[n]) >= usual and 2 * _numbers(rows[n], decimal) >= len(rows[n])
+        ]
+        numbers = [_numbers(row, decimal) for row in rows]
+    if width == len(rows[first - 1]) + 1 and not any(rows[n][-1] for n in data if len(rows[n]) == width):
+        width -= 1  # a separator behind the last field
+        rows = [row[:width] for row in rows]
     below = rows[first - 1]
     units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])
     units = units and any(below) and all(_UNIT.fullmatch(cell) for cell in below if cell)
@@ -335,6 +381,19 @@ def _table(
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
     return (len(alike), sum(numbers[n] for n in alike[:1])), found
+
+
+def _headless(
+    rows: list[list[str]], data: list[int], numbers: list[int], encoding: str, separator: str, decimal: str
+) -> tuple[tuple[int, int], Dialect] | None:
+    """Make the dialect of a table without headers, of which every cell is a number."""
+    width = len(rows[0])
+    alike = [n for n in data if len(rows[n]) == width]
+    if width < 2 or numbers[0] < width:
+        return None
+    header = tuple(f"column{n + 1}" for n in range(width))
+    found = Dialect(header, None, tuple(rows[0]), encoding, separator, decimal, headless=True)
+    return (len(alike), numbers[0]), found
 
 
 def _unquoted(cell: str) -> str:

@@ -21,7 +21,14 @@ if TYPE_CHECKING:
 
 
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+*/-].*?)\s*")
-_IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
+_PER_RECORDED = re.compile(r"/\s*(?:V|mV|volts?|counts?|bits?|digits?)\s*$", re.IGNORECASE)
+"""What a calibration is for: one unit of the recorder, as its cells are."""
+_ABOUT = re.compile(
+    r"(?P<scale>.+?)\s+about\s+(?:the mean of the first (?P<first>\d{1,7})|"
+    r"(?P<zero>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?:m?V|counts?|[A-Za-z]{0,8})?)\s*"
+)
+"""A unit, and the reading of the recorder that means zero."""
+_IN_BRACKETS = re.compile(r"[\[(\uff08\u3010]\s*([^\[\]()\uff08\uff09\u3010\u3011]+?)\s*[\])\uff09\u3011]\s*$")
 _LOGGERS = {
     "Sec": "s",
     "sec": "s",
@@ -66,8 +73,9 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
     Parameters
     ----------
     values : (n,) in `unit`
-    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N`
-        for one recorded unit, such as a volt of the logger)
+    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N` or `980.665 N/V`
+        for one recorded unit, such as a volt of the logger); behind either the reading that means zero,
+        `about 2.5 V` or `about the mean of the first 10`
     quantity : of the values
 
     Returns
@@ -83,10 +91,19 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
     >>> from pzd.quantities import FORCE
     >>> to_canonical(np.array([1.5]), "kN", FORCE).tolist()
     [1500.0]
+    >>> to_canonical(np.array([2.5, 2.5, 3.0]), "-200 N/V about the mean of the first 2", FORCE).tolist()
+    [0.0, 0.0, -100.0]
     """
     if unit == quantity.unit:
         return values
-    sized = _NUMBER_AND_UNIT.fullmatch(unit)
+    about = _ABOUT.fullmatch(unit)
+    if about:
+        first = int(about["first"]) if about["first"] else None
+        if first is not None and not 0 < first <= values.size:
+            raise UnitError(f"{quantity.name}: {unit!r} asks for the mean of {first} of {values.size} values")
+        zero = float(np.mean(values[:first])) if first is not None else float(about["zero"])
+        return to_canonical(values - zero, about["scale"], quantity)
+    sized = _NUMBER_AND_UNIT.fullmatch(_PER_RECORDED.sub("", unit))
     if sized:
         size = float(sized[1])
         if not (np.isfinite(size) and size != 0.0):

@@ -87,8 +87,11 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     if numbers.size == 0:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
     uneven = lines.fields != len(header)
+    trailing = 0
     if entry.split is not None and entry.split.event == header[-1]:
         body, uneven = _with_loose_events(lines, len(header))
+    elif uneven.any():
+        body, uneven, trailing = _without_trailing_separators(lines, len(header))
     if uneven.any():
         if entry.header is None:
             rows = [row for row, line in enumerate(body.split("\n")) if fields_of(line, lines.separator) == header]
@@ -105,7 +108,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         more, bad = table.numbers([column])
         values, faults = values | more, faults | bad
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    steps = tuple(_steps(entry, header, wanted, numbers))
+    steps = tuple(_steps(entry, header, wanted, numbers, trailing))
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
 
 
@@ -127,8 +130,11 @@ def _plain_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     top, body = text[:start].split("\n")[:above], text[start:]
     first = top[0] if top else text[: after_lines(text, 1)].rstrip("\n")
     separator = entry.separator or _separator_of(first, wanted.known, entry.decimal)
+    empty = 0
+    while body[: body.find("\n") + 1].strip(" \n") == "" and "\n" in body:  # between the head and the first row
+        body, empty = body[body.find("\n") + 1 :], empty + 1
     fields = _field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
-    numbers = np.arange(fields.size) + entry.skip + above + 1
+    numbers = np.arange(fields.size) + entry.skip + above + empty + 1
     return _Lines([fields_of(line, separator) for line in top], body, numbers, fields, separator)
 
 
@@ -150,6 +156,8 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
         if len(heads) < above:
             heads.append([cell.strip() for cell in row])
             continue
+        if not numbers and not line.strip():
+            continue  # between the head and the first row
         numbers.append(number)
         fields.append(len(row))
         block.append(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row))
@@ -216,6 +224,28 @@ def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_
     return "\n".join(rows), uneven
 
 
+def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_], int]:
+    """Take away a separator behind the last field of a row, which some loggers write on all rows or on some.
+
+    Returns
+    -------
+    the body without them, (rows,) which rows are uneven all the same, and in how many there was one
+    """
+    longer = lines.fields == width + 1
+    uneven = (lines.fields != width) & ~longer
+    if lines.separator == BLANKS or np.count_nonzero(longer) < 2:  # one row alone may have lost a field
+        return lines.body, lines.fields != width, 0
+    rows = lines.body.split("\n")
+    count = 0
+    for row in np.flatnonzero(longer).tolist():
+        short = rows[row].rstrip(" ")
+        if short.endswith(lines.separator):
+            rows[row], count = short[: -len(lines.separator)], count + 1
+        else:
+            uneven[row] = True
+    return "\n".join(rows), uneven, count
+
+
 def _refuse_repeated_header(path: Path, numbers: NDArray[np.int64], rows: Sequence[int]) -> None:
     """Refuse a file whose header stands again in some rows: a logger that was started again wrote on."""
     if rows:
@@ -240,8 +270,12 @@ def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: in
     return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{advice}"]
 
 
-def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[ReadingStep]:
+def _steps(
+    entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64], trailing: int
+) -> Iterator[ReadingStep]:
     """Report what is read of a file, and the lines and columns that are left out."""
+    if trailing:
+        yield ReadingStep("left out", None, f"{counted(trailing, 'separator')} behind the last field of a row", "")
     if entry.skip:
         yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
