@@ -1,4 +1,4 @@
-"""Pages in one file that ask nothing of the net and run no script: the report, and that of `pzd check --plot`."""
+"""Pages in one file that ask nothing of the net: the report, and that of `pzd check --plot`."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ from pzd.report.blocks import (
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, encoded, pictures, styled
+from pzd.report.explorer import Explorer, policy, scripts
+from pzd.report.explorer import explorer as explorer_of
 from pzd.report.plots import library
 from pzd.report.ride_comfort import Comparison, RatedRides
 from pzd.report.sections import damper, missing, passenger, tested, trust
@@ -263,7 +265,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         filter(None, ("Damper and comfort report" if context.ridden else "Damper report", context.setting))
     )
     first = Opening(answer(context), tuple(picture for row in drawn["answer"] for picture in row))
-    return render(title, cards(context), _assumed(context), sections, opening=first)
+    return render(title, cards(context), _assumed(context), sections, opening=first, explorer=explorer_of(context))
 
 
 def _assumed(context: ReportContext) -> tuple[str, ...]:
@@ -284,6 +286,7 @@ def render(
     sections: tuple[Section, ...],
     footer: str = _FOOTER,
     opening: Opening | None = None,
+    explorer: Explorer | None = None,
 ) -> str:
     """Fill the template of the report.
 
@@ -295,7 +298,9 @@ def render(
     sections : of the page
     footer : its last line
     opening : what stands first, before the headline
+    explorer : of the records
     """
+    runs = scripts() if explorer else ()
     texts = {
         "title": title,
         "cards": headline,
@@ -303,6 +308,9 @@ def render(
         "sections": sections,
         "footer": footer,
         "opening": opening,
+        "explorer": explorer,
+        "scripts": runs,
+        "policy": policy(runs),
         "wide": WIDE,
     }
     return filled("pzd.report", "report.html", texts)

@@ -98,7 +98,7 @@ def shown(page: str, width: int, folder: Path) -> tuple[dict[str, Any], list[str
     done = chromium(folder, "--window-size=1500,1000", "--dump-dom", (folder / "frame.html").as_uri())
     title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
     assert title is not None, done.stderr
-    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "[bokeh" not in line]
     return json.loads(unescape(title[1])), console
 
 
