@@ -80,6 +80,10 @@ coverage-study: $(DEV)  ## Print how often the intervals of identify hold the tr
 nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of NIST StRD; a second
 	PYTHONPATH=.:tests/fit $(BIN)/python tests/studies/nist.py
 
+.PHONY: plain-study
+plain-study: $(DEV)  ## Measure 600 plain dampers from everywhere: whether pzd says that nothing is missing; an hour
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/plain_study.py --jobs $(JOBS)
+
 .PHONY: sensitivity
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py

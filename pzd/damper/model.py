@@ -35,7 +35,7 @@ class BaseRow(Frozen):
     """Dry friction force."""
     C_Ns_per_m: float = Field(ge=0.0)
     """Damping coefficient."""
-    k_N_per_m: float = Field(default=math.inf, gt=0.0, allow_inf_nan=True)
+    k_N_per_m: float = Field(gt=0.0, allow_inf_nan=True)
     """Stiffness of the oil spring; empty or `.inf` for a rigid damper."""
 
     @field_validator("k_N_per_m", mode="before")

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -125,13 +126,19 @@ class Dynamics:
 
         Raises
         ------
-        ConfigError : when it has an effect that is not carried exactly
+        ConfigError : when it has an effect that is not carried exactly, or is rigid or without damping
         """
         others = [effect for effect in damper.effects if effect not in (*CARRIED, *OF_THE_RIG)]
         if others:
             raise ConfigError(
                 f"--to {name}: {', '.join(others)} of the damper has no closed form under held inputs and cannot be "
                 "carried exactly; a table, as --to mat writes, holds its steady force"
+            )
+        if any(math.isinf(row.k_N_per_m) or row.C_Ns_per_m == 0.0 for row in damper.base):
+            raise ConfigError(
+                f"--to {name}: follows the load of the oil spring, which takes a number for k and a C above 0: write "
+                "them into k_N_per_m and C_Ns_per_m of 3-diagnose/damper.yaml (got a rigid damper, or one without "
+                "damping)"
             )
         drifts = [effect.name for effect in acting("material") if effect.name in damper.effects]
         still = damper.model_copy(update={"effects": {k: v for k, v in damper.effects.items() if k not in drifts}})

@@ -494,3 +494,12 @@ def test_the_time_that_was_reached_is_known_and_no_step_is_pending(tmp_path: Pat
     slave.freeInstance()
     last_successful_time, terminated = 2, 3
     assert answered == {("Real", last_successful_time): 0.25, ("Boolean", terminated): 0}
+
+
+@pytest.mark.parametrize("values", [{"k_N_per_m": np.inf}, {"C_Ns_per_m": 0.0}], ids=["rigid", "without damping"])
+def test_a_damper_without_an_oil_spring_to_follow_is_refused_and_then_taken(values: dict[str, float]) -> None:
+    plain = DAMPERS["plain"]
+    limit = plain.model_copy(update={"base": tuple(row.model_copy(update=values) for row in plain.base)})
+    with pytest.raises(ConfigError, match="a number for k and a C above 0: write them into k_N_per_m and C_Ns_per_m"):
+        formats()["fmu"].files(content_of(limit))
+    formats()["fmu"].files(content_of(plain))

@@ -1,0 +1,90 @@
+"""When nothing is missing, diagnose says so: plain dampers from where books begin, the limits of the law among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+from synthetic import STAND
+
+from pzd.artefacts import Diagnosed, ParameterRow, Rig
+from pzd.blind.independent.kernel import plain_force
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.stage import diagnose
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.quantities import Control
+from pzd.record import Array, Record
+
+FINER = 32
+"""Steps of the integration a sample."""
+Sine = tuple[float, float]
+"""Frequency [Hz] and amplitude [m]."""
+
+
+def record_of(
+    T0: float, C: float, k: float, sine: Sine, noise: Array, rate: float, voltage: float | None = None
+) -> Record:
+    """A sine test of a plain damper, by the integrator of the second generator; as long as its noise [N]."""
+    frequency, amplitude = sine
+    omega, lead = 2.0 * np.pi * frequency, round(1.5 * rate / frequency)
+    fine = (np.arange((lead + noise.size - 1) * 2 * FINER + 1) / (2 * FINER) - lead) / rate
+    force = plain_force(fine, amplitude * np.sin(omega * fine), T0, C, 1.0 / k)[::FINER][lead:]
+    t = fine[:: 2 * FINER][lead:]
+    x, v = amplitude * np.sin(omega * t), amplitude * omega * np.cos(omega * t)
+    volts = None if voltage is None else np.full(t.size, voltage)
+    name = f"{voltage}-{frequency:g}Hz-{1e3 * amplitude:g}mm"
+    return Record(name, None, t, x, v, -(omega**2) * x, force + noise, volts)
+
+
+def diagnosed(records: Sequence[Record]) -> tuple[tuple[ParameterRow, ...], Diagnosed]:
+    rig = Rig(tuple(records), ())
+    found = identify(IdentifyConfig(), rig, 1)
+    return found.rows, diagnose(DiagnoseConfig(), IdentifyConfig(), STAND, rig, found, Control(), None, 1)
+
+
+THREE = ((1.0, 0.02), (2.0, 0.02), (1.0, 0.01))
+BOOKS = [(300.0, 1000.0, np.inf), (300.0, 0.0, np.inf), (0.0, 1000.0, np.inf), (300.0, 0.0, 1e5), (0.0, 1000.0, 1e5)]
+
+
+@pytest.mark.parametrize(("T0", "C", "k"), BOOKS, ids=["rigid", "friction", "viscous", "elasto-plastic", "Maxwell"])
+def test_the_dampers_of_the_books_lack_nothing(T0: float, C: float, k: float, rng: Generator) -> None:
+    """F = 300 sign(v) + 1000 v, the first sentence of most of them, and its kin, with 1 N of noise."""
+    (row,), found = diagnosed([record_of(T0, C, k, sine, rng.standard_normal(6001), 1000.0) for sine in THREE])
+    assert found.diagnosis.effects == ()
+    assert found.diagnosis.verdict == "none", found.diagnosis.reason
+    assert pytest.approx(T0, abs=0.3) == row.T0_N
+    assert row.W_s < 3e-4
+    if np.isinf(k):
+        assert row.k_N_per_m is None
+        assert "above" in row.status
+        assert row.k_N_per_m_low95 > 5e5
+    else:
+        assert row.k_N_per_m == pytest.approx(k, rel=0.02)
+    if C > 0.0:
+        assert row.C_Ns_per_m == pytest.approx(C, rel=2e-3)
+    else:
+        assert (row.C_Ns_per_m or 0.0) < 1.0
+        assert row.C_Ns_per_m_low95 == 0.0
+
+
+def test_a_damper_that_hardly_damps_is_not_given_a_relief_valve() -> None:
+    """T0 200 N, C 1 N s/m, k 2e6 N/m without noise: what identify leaves open is no other C in diagnose."""
+    tests = ((2.0, 0.03), (1.0, 0.03), (1.0, 0.06))
+    _, found = diagnosed([record_of(200.0, 1.0, 2e6, sine, np.zeros(8001), 1000.0) for sine in tests])
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("none", ()), found.diagnosis.reason
+
+
+def test_an_elasto_plastic_damper_at_three_voltages_is_plain(rng: Generator) -> None:
+    records = [
+        record_of(T0, 0.55, 1.19e5, sine, 5e-4 * T0 * rng.standard_normal(8001), 2000.0, voltage)
+        for voltage, T0 in ((0.0, 201.0), (1.0, 322.0), (2.0, 442.0))
+        for sine in ((1.0, 0.02), (2.0, 0.015))
+    ]
+    rows, found = diagnosed(records)
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("none", ()), found.diagnosis.reason
+    for row, T0 in zip(rows, (201.0, 322.0, 442.0), strict=True):
+        assert pytest.approx(T0, rel=1e-3) == row.T0_N
+        assert row.k_N_per_m == pytest.approx(1.19e5, rel=0.01)
