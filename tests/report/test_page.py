@@ -522,6 +522,18 @@ def test_an_untrusted_ride_is_marked(words_only: None, run: Any) -> None:
     assert "energy error 1.0e-03" in read.text
 
 
+@pytest.mark.parametrize(("tested", "told"), [(0.02, True), (0.05, False), (None, False)])
+def test_rides_beyond_the_tested_stroke_are_told_with_the_effects_that_depend_on_it(
+    words_only: None, run: Any, tested: float | None, told: bool
+) -> None:
+    notes = run.table.notes.model_copy(update={"reached_stroke_m": tested})
+    damper = run.diagnosed.damper.with_effect("end_stop", {"k_e": 1e6, "x_e": 0.02})
+    stops = replace(run, table=replace(run.table, notes=notes), diagnosed=replace(run.diagnosed, damper=damper))
+    text = Reader(stops.told().page).text
+    assert ("rides go farther than any test did (0.02 m from the middle of the stroke)" in text) is told
+    assert ("there no test shows what end_stop does" in text) is told
+
+
 def test_sensors_and_supply_are_told_where_the_config_has_them_and_assumed_perfect_where_not(
     words_only: None, run: Any
 ) -> None:

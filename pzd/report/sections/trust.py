@@ -67,7 +67,7 @@ def render(context: ReportContext) -> Section:
     if ridden:
         columns = (
             Column("case", "ride"),
-            Column("energy_error", "energy error / dissipated", digits=2),
+            Column("energy_error", "energy error / energy that flows", digits=2),
             tables.share("outside_table", "time outside of the rig's range"),
         )
         blocks.append(Table("Energy balance and table", columns, context.rides.summary, fold=0).block())
