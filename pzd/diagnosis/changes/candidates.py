@@ -219,7 +219,7 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
         if effect.needs is not None:
             continue
         found += _present(first, name) if present else [_absent(first, name)]
-    return found
+    return [candidate for candidate in found if all(c.low < c.high for c in candidate.coordinates)]
 
 
 def _of_stand(name: str, force: float) -> Candidate:

@@ -285,8 +285,7 @@ class Findings:
         likelihood = self.search.regression.likelihood
         missed = [np.sum(likelihood.missed_by_model(i)) for i in range(len(self.comparisons))]
         noise = float(np.mean([np.sum(c.variance) + m for c, m in zip(self.comparisons, missed, strict=True)]))
-        own = likelihood.own_of_tests(best.residuals, best.scatter)
-        left = float(np.mean([(r - o) @ (r - o) for r, o in zip(best.residuals, own, strict=True)]))
+        left = self._left(best)
         explained = 1.0 - max(left - noise, 0.0) / (whole - noise) if whole > noise else 0.0
         return Difference(
             rms_N=whole**0.5,
@@ -295,6 +294,11 @@ class Findings:
             left_N=left**0.5,
             explained=float(np.clip(explained, 0.0, 1.0)),
         )
+
+    def _left(self, fitted: Fitted) -> float:
+        """Return the mean square that a fit leaves beside each test's own offset, gain and delay [N^2]."""
+        own = self.search.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
+        return float(np.mean([(r - o) @ (r - o) for r, o in zip(fitted.residuals, own, strict=True)]))
 
     def _left_share(self, difference: Difference) -> float:
         whole = difference.rms_N**2 - difference.noise_N**2

@@ -173,14 +173,14 @@ class Fitted:
         """All coordinates."""
         return coordinates_of(self.candidates)
 
-    def values_of(self, candidate: Candidate) -> Array:
-        """Return the values of one candidate's coordinates."""
-        return self.values[[self.coordinates.index(c) for c in candidate.coordinates]]
-
     @property
     def mean_square(self) -> float:
         """Mean square of what is left, over the comparisons [N^2]."""
         return float(np.mean([r @ r for r in self.residuals]))
+
+    def values_of(self, candidate: Candidate) -> Array:
+        """Return the values of one candidate's coordinates."""
+        return self.values[[self.coordinates.index(c) for c in candidate.coordinates]]
 
 
 def coordinates_of(candidates: Sequence[Candidate]) -> tuple[Coordinate, ...]:

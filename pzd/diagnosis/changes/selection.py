@@ -121,7 +121,9 @@ class Search:
         """Return the fits with one more change that is visible and physical, the best first."""
         promising = self._promising(before, self._tried(before), before.scatter)
         worth = [p for i, p in enumerate(promising) if i < FITTED or p.candidate.name in ELEMENT_COLUMNS]
-        fits = [fitted for fitted in (self._with(before, p) for p in worth) if self._admissible(fitted)]
+        # What leaves more of the force than its absence only fits where the scatter is thought to be small.
+        limit = self._left(before)
+        fits = [f for f in (self._with(before, p) for p in worth) if self._admissible(f) and self._left(f) < limit]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
@@ -145,12 +147,16 @@ class Search:
 
     def _leaves_nothing(self, fitted: Fitted) -> bool:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
+        return self._left(fitted) < max(self.visible, self._hidden)
+
+    def _left(self, fitted: Fitted) -> float:
+        """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks)."""
         own = self.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
         squares = [
             max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
         ]
-        return float(np.sqrt(np.mean(squares))) < max(self.visible, self._hidden)
+        return float(np.sqrt(np.mean(squares)))
 
     def _continued(self, best: Fitted) -> Fitted:
         """Adopt changes as long as something visible is left and the criterion falls by enough."""

@@ -20,6 +20,9 @@ from pzd.quantities import Control
 from pzd.record import Record, mid_stroke, voltage_scale
 from pzd.rig.config import RigConfig
 
+SOFTEST = 0.1
+"""Least C by which effect parameters are scaled [largest force over largest speed]: a friction damper has none."""
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -56,13 +59,14 @@ class State:
         def largest(values: Sequence[float]) -> float:
             return max(*values, float(np.finfo(float).tiny))
 
+        speed = largest([float(np.max(np.abs(r.velocity))) for r in self.records])
         return Scales(
             largest(peaks),
             min(peaks),
-            largest([float(np.max(np.abs(r.velocity))) for r in self.records]),
+            speed,
             largest([float(np.max(np.abs(r.displacement - zero))) for r in self.records]),
             largest([float(np.max(np.abs(r.acceleration))) for r in self.records]),
-            float(np.median([row.C_Ns_per_m for row in self.damper.base])),
+            max(float(np.median([row.C_Ns_per_m for row in self.damper.base])), SOFTEST * largest(peaks) / speed),
             self.voltage_scale,
         )
 

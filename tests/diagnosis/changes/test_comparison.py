@@ -44,7 +44,7 @@ def test_a_parameter_that_changed_is_named_with_its_size(
         assert changes.verdict == "changed"
         assert names(changes) == [parameter]
         assert inside(changes.changes[0], factor, slack=2.0)
-        assert changes.changes[0].share > 0.9
+        assert changes.changes[0].share > 0.8
         assert changes.difference.explained > 0.95
 
 
@@ -138,7 +138,7 @@ def test_motions_that_were_not_run_before_are_compared_through_the_model(rng: np
 
 def test_states_without_a_repeating_test_are_refused_with_what_to_do(rng: np.random.Generator) -> None:
     damper: Damper = drawn_damper(rng)
-    records = campaign(damper, rng)
+    records = campaign(damper, rng, motions=((2.0, 0.02),))
     wandering = [replace(r, displacement=0.02 * np.cumsum(rng.standard_normal(r.time.size)) / 30.0) for r in records]
     with pytest.raises(DataError, match=r"aged: no test repeats.*run a sine"):
         found(records, wandering)
