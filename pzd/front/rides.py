@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from pzd.artefacts import Diagnosed, Rides, SummaryRow, WeightedRow
 from pzd.front.arguments import in_python
-from pzd.front.dampers import Damper, table_stage
+from pzd.front.dampers import CurveDamper, Damper, table_stage
 from pzd.front.pipelines import config_of
 from pzd.front.results import Result, new_axes
 from pzd.quantities import Control
@@ -108,7 +108,7 @@ def ride(
 
     Parameters
     ----------
-    damper : the damper at both axles
+    damper : the damper at both axles; one by its measured curve is ridden by it, whatever the fidelity says
     road : "sine" (2.25 Hz, 0.02 m), the kind of another one whose keys all have defaults, or its block in a config,
         such as {"kind": "sine", "frequency_Hz": 4.5}
     policy : how the dampers are controlled, as in `simulate.policies`
@@ -126,7 +126,7 @@ def ride(
     ValueError : when a value is none that a config may have, or the damper cannot be ridden so
     """
     from pzd.simulate.config import SimulateConfig
-    from pzd.simulate.stage import simulate
+    from pzd.simulate.stage import simulate, simulate_by_table
 
     if not isinstance(damper, Damper):
         raise TypeError(f"damper: must be a pzd.Damper (got {type(damper).__name__})")
@@ -148,5 +148,7 @@ def ride(
         block["settle_s"] = round(0.5 * duration, 3)
     config = config_of(damper.control, simulate={**block, **keys_of_the_block}, seed=seed).simulate
     table = table_stage(damper, {})
+    if isinstance(damper, CurveDamper):
+        return CarRide(simulate_by_table(config, table, seed, Path(), jobs), damper.control)
     alone = Diagnosed.undiagnosed(damper.model)
     return CarRide(simulate(config, alone, table, seed, Path(), jobs), damper.control)

@@ -12,7 +12,12 @@ from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pzd.artefacts import Response
     from pzd.simulate.roads import Profile
+    from pzd.simulate.study.plan import Case
+    from pzd.simulate.study.tuning import Setup
 
 
 def simulate(
@@ -36,7 +41,6 @@ def simulate(
     DataError : when a ride needs the table where it ends
     """
     from pzd.simulate.ride.model import check_inertance, dynamic_damper_of, grid_of, table_of
-    from pzd.simulate.study.gathering import Gathering
     from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
     from pzd.simulate.study.response import responses
     from pzd.simulate.study.tuning import Setup
@@ -56,10 +60,58 @@ def simulate(
         check_inertance(dynamic, simulate.car.car())
         setups[plain] = Setup(simulate, profiles, grid, dynamic, table.notes.outside == "error")
 
+    answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
+    return _ridden(simulate, planned, setups, answered, with_voltage=with_voltage, jobs=jobs)
+
+
+def simulate_by_table(simulate: SimulateConfig, table: Table, seed: int, folder: Path, jobs: int = 1) -> Rides:
+    """Ride every case of the config on a damper that is known by its table alone, as a measured curve is.
+
+    It has no oil spring and no valve: what would be ridden `dynamic` is ridden by the table.
+
+    Parameters
+    ----------
+    simulate, table, seed, folder, jobs : as `simulate`
+
+    Raises
+    ------
+    ConfigError, DataError : as `simulate` does
+    """
+    from pzd.damper.model import PHYSICAL, BaseRow, Damper
+    from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+    from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
+    from pzd.simulate.study.tuning import Setup
+
+    fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
+    config = simulate.model_copy(update={"fidelities": fidelities})
+    voltages = tuple(dict.fromkeys(row.voltage_V for row in table.force))
+    with_voltage = None not in voltages
+    planned = cases(config, with_voltage, changed=False)
+    checked_voltage(config, table)
+    # The kernels want a dynamic damper; these rides never ask it for a force.
+    unused = BaseRow(T0_N=0.0, C_Ns_per_m=1.0, k_N_per_m=PHYSICAL["k_N_per_m"][1])
+    rows = tuple(unused.model_copy(update={"voltage_V": voltage}) for voltage in voltages)
+    dynamic = dynamic_damper_of(Damper(base=rows), None, config.valve_response_s)
+    grid = grid_of(table, checked_temperature(config, table))
+    setup = Setup(config, profiles_of(config, seed, folder), grid, dynamic, table.notes.outside == "error")
+    return _ridden(config, planned, {False: setup}, (), with_voltage=with_voltage, jobs=jobs)
+
+
+def _ridden(
+    simulate: SimulateConfig,
+    planned: tuple[Case, ...],
+    setups: Mapping[bool, Setup],
+    answered: tuple[Response, ...],
+    *,
+    with_voltage: bool,
+    jobs: int,
+) -> Rides:
+    """Ride the cases, on the damper before diagnose and on that after."""
+    from pzd.simulate.study.gathering import Gathering
+
     gathering = Gathering(simulate, with_voltage)
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         rides = list(pool.map(lambda case: gathering.of_ride(case, setups[case.plain].ridden), planned))
-    answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
     return gathering.all(planned, rides, answered)
 
 
