@@ -12,9 +12,10 @@ from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from pzd.artefacts import Response
+    from pzd.damper.model import Damper
     from pzd.simulate.roads import Profile
     from pzd.simulate.study.plan import Case
     from pzd.simulate.study.tuning import Setup
@@ -64,37 +65,60 @@ def simulate(
     return _ridden(simulate, planned, setups, answered, with_voltage=with_voltage, jobs=jobs)
 
 
-def simulate_by_table(simulate: SimulateConfig, table: Table, seed: int, folder: Path, jobs: int = 1) -> Rides:
-    """Ride every case of the config on a damper that is known by its table alone, as a measured curve is.
+def simulate_on_axles(
+    simulate: SimulateConfig, axles: Sequence[tuple[Damper | None, Table]], seed: int, folder: Path, jobs: int = 1
+) -> Rides:
+    """Ride every case of the config with a damper of its own at each axle.
 
-    It has no oil spring and no valve: what would be ridden `dynamic` is ridden by the table.
+    A damper that is known by its table alone, as a measured curve is, has no oil spring and no valve: where one is
+    among them, what would be ridden `dynamic` is ridden by the tables.
 
     Parameters
     ----------
-    simulate, table, seed, folder, jobs : as `simulate`
+    simulate : the config's block
+    axles : damper and table of axle 1, and of axle 2 where it is another one; None for a damper known by its table
+    seed, folder, jobs : as `simulate`
 
     Raises
     ------
-    ConfigError, DataError : as `simulate` does
+    ConfigError : as `simulate` does; and when one of two dampers has a control signal and the other has none, or a
+        policy predicts one damper at both axles
+    DataError : as `simulate` does
     """
-    from pzd.damper.model import PHYSICAL, BaseRow, Damper
-    from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+    from pzd.simulate.ride.model import check_inertance, dynamic_damper_of, grid_of
     from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
     from pzd.simulate.study.tuning import Setup
 
-    fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
-    config = simulate.model_copy(update={"fidelities": fidelities})
-    voltages = tuple(dict.fromkeys(row.voltage_V for row in table.force))
-    with_voltage = None not in voltages
-    planned = cases(config, with_voltage, changed=False)
-    checked_voltage(config, table)
-    # The kernels want a dynamic damper; these rides never ask it for a force.
-    unused = BaseRow(T0_N=0.0, C_Ns_per_m=1.0, k_N_per_m=PHYSICAL["k_N_per_m"][1])
-    rows = tuple(unused.model_copy(update={"voltage_V": voltage}) for voltage in voltages)
-    dynamic = dynamic_damper_of(Damper(base=rows), None, config.valve_response_s)
-    grid = grid_of(table, checked_temperature(config, table))
-    setup = Setup(config, profiles_of(config, seed, folder), grid, dynamic, table.notes.outside == "error")
-    return _ridden(config, planned, {False: setup}, (), with_voltage=with_voltage, jobs=jobs)
+    config, controlled, mounted = simulate, [], []
+    if any(damper is None for damper, _ in axles):
+        fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
+        config = simulate.model_copy(update={"fidelities": fidelities})
+    for damper, table in axles:
+        controlled.append(all(row.voltage_V is not None for row in table.force))
+        checked_voltage(config, table)
+        temperature = checked_temperature(config, table)
+        dynamic = dynamic_damper_of(damper or _never_asked(table), temperature, config.valve_response_s)
+        check_inertance(dynamic, config.car.car())
+        mounted.append((grid_of(table, temperature), dynamic))
+    if len(set(controlled)) > 1:
+        raise ConfigError("damper: that of one axle has a control signal, and that of the other has none")
+    planned = cases(config, controlled[0], changed=False)
+    foreseeing = [case.policy.name for case in planned if case.policy.aim in ("predict", "schedule")]
+    if foreseeing and len(axles) > 1:
+        raise ConfigError(f"simulate.policies: {foreseeing[0]} knows one damper at both axles, and there are two")
+    ends = any(table.notes.outside == "error" for _, table in axles)
+    rear = mounted[1] if len(mounted) > 1 else None
+    setup = Setup(config, profiles_of(config, seed, folder), *mounted[0], ends, rear)
+    return _ridden(config, planned, {False: setup}, (), with_voltage=controlled[0], jobs=jobs)
+
+
+def _never_asked(table: Table) -> Damper:
+    """Return what the kernels want where only a table is ridden: they ask it for no force."""
+    from pzd.damper.model import PHYSICAL, BaseRow, Damper
+
+    row = BaseRow(T0_N=0.0, C_Ns_per_m=1.0, k_N_per_m=PHYSICAL["k_N_per_m"][1])
+    voltages = dict.fromkeys(row.voltage_V for row in table.force)
+    return Damper(base=tuple(row.model_copy(update={"voltage_V": voltage}) for voltage in voltages))
 
 
 def _ridden(

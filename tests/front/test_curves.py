@@ -104,3 +104,60 @@ def test_its_force_along_a_motion_has_no_memory() -> None:
 def test_what_is_no_curve_is_refused(change, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         pzd.Damper.from_curve(**{"velocity": VELOCITY, "force": FORCE, **change})
+
+
+# ---------------------------------------------------------------- front and rear
+
+
+def viscous(c: float) -> pzd.Damper:
+    return pzd.Damper({"T0_N": 200.0, "C_Ns_per_m": c, "k_N_per_m": 3e5})
+
+
+@pytest.mark.parametrize("fidelity", ["table", "dynamic"])
+def test_a_pair_of_equal_dampers_rides_as_one_at_both_axles(fidelity: str) -> None:
+    keys = {"fidelity": fidelity, "duration": 4.0}
+    one, pair = pzd.ride(viscous(2500.0), **keys), pzd.ride((viscous(2500.0), viscous(2500.0)), **keys)
+    assert pair.a_w == one.a_w
+    pd.testing.assert_frame_equal(pair.history, one.history, check_exact=True)
+
+
+@pytest.mark.parametrize("fidelity", ["table", "dynamic"])
+def test_each_axle_has_the_force_of_its_own_damper(fidelity: str) -> None:
+    """At high speed the force of each axle over its rate is that of its damper: 2 to 1, and 1 to 2 the other way."""
+    soft, hard = viscous(1500.0), viscous(4500.0)
+    front, rear = (pzd.ride(pair, fidelity=fidelity, duration=4.0) for pair in ((hard, soft), [soft, hard]))
+    for ride, harder in ((front, 1), (rear, 2)):
+        slopes = {}
+        for axle in (1, 2):
+            rate, force = ride.history[f"deflection_rate_{axle}_m_per_s"], ride.history[f"damper_force_{axle}_N"]
+            fast = rate.abs() > 0.5 * rate.abs().max()
+            slopes[axle] = float((force[fast] * rate[fast]).sum() / (rate[fast] ** 2).sum())
+        assert slopes[harder] > 2.0 * slopes[3 - harder]
+        assert abs(ride.summary["energy_error"]) < 1e-6
+    assert front.a_w != rear.a_w
+
+
+def test_a_curve_and_a_law_may_ride_together_by_their_tables() -> None:
+    straight = pzd.Damper.from_curve([-1.0, 1.0], [-2500.0, 2500.0])
+    law = pzd.Damper({"T0_N": 0.0, "C_Ns_per_m": 2500.0, "k_N_per_m": 1e9})
+    mixed, alone = pzd.ride((straight, law), duration=4.0), pzd.ride(law, fidelity="table", duration=4.0)
+    assert mixed.a_w == pytest.approx(alone.a_w, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pair", "keys", "error", "words"),
+    [
+        ((viscous(1e3), 3), {}, TypeError, "front and rear"),
+        ((viscous(1e3),) * 3, {}, TypeError, "front and rear"),
+        ((viscous(1e3), pzd.Damper.from_curve(VELOCITY, FORCE, voltage=1.0)), {}, ValueError, "has a control signal"),
+        (
+            (viscous(1e3), pzd.Damper.from_curve(VELOCITY, FORCE, control=("current", "A"))),
+            {},
+            ValueError,
+            "other names",
+        ),
+    ],
+)
+def test_a_pair_that_cannot_ride_is_refused(pair, keys, error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        pzd.ride(pair, duration=4.0, **keys)
