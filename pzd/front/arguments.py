@@ -49,7 +49,7 @@ def numbers(name: str, values: Any, size: int | None = None) -> Array:
     ----------
     name : of the argument, for messages
     values : what was given
-    size : n that is needed, where another argument sets it
+    size : n that is needed, where the first argument sets it
 
     Raises
     ------
@@ -77,7 +77,7 @@ def numbers(name: str, values: Any, size: int | None = None) -> Array:
         raise ValueError(f"{name}: must be one column, (n,) (got an array of shape {found.shape})")
     flat = np.array(found, dtype=np.float64).ravel()
     if size is not None and flat.size != size:
-        raise ValueError(f"{name}: must have {size} values, as many as there are times (got {flat.size})")
+        raise ValueError(f"{name}: must have {size} values, as many as the first array (got {flat.size})")
     bad = np.flatnonzero(~np.isfinite(flat))
     if bad.size:
         more = f", and {bad.size - 1} more such values" if bad.size > 1 else ""

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from pzd.damper.curve import ForceCurve
+    from pzd.damper.motion import Motion
     from pzd.pipeline.execution import InMemory
 
 _DRAWN = 401
@@ -84,6 +86,49 @@ class Damper(Result):
         made.model, made.control, made.behind = model, control, behind
         return made
 
+    @classmethod
+    @in_python
+    def from_curve(
+        cls, velocity: Any, force: Any, voltage: Any = None, sign: Any = 1, control: Any = ("voltage", "V")
+    ) -> CurveDamper:
+        """Make a damper of a measured curve of force over velocity.
+
+        It has no oil spring: `ride` rides it as it stands, and its voltage acts at once. Between the points the force
+        is monotone where they are; beyond them it goes on along the last straight line, which counts as outside.
+
+        Parameters
+        ----------
+        velocity : (n,) from compression to rebound [m/s]
+        force : (n,), or (n, m) with a column for each of the m voltages [N]
+        voltage : (m,) values of the control signal; a number for one curve
+        sign : 1 where extension (rebound) is positive; -1 where compression is, in velocity and force, or in the force
+            alone where it has the sign opposite to that of the velocity
+        control : name and unit of the control signal
+
+        Raises
+        ------
+        TypeError : when something is no array of numbers
+        ValueError : when they are no curve of a damper
+        """
+        from pzd.damper.curve import curve_of
+
+        if isinstance(sign, bool) or sign not in (1, -1):
+            raise ValueError(f"sign: must be 1 or -1 (got {sign!r})")
+        v, signal = numbers("velocity", velocity), control_of(control)
+        values = None if voltage is None else numbers("voltage", np.atleast_1d(voltage))
+        shape = np.shape(force)
+        if len(shape) == 2 and shape[0] == v.size:
+            columns = np.asarray(force)
+            forces = np.column_stack([numbers("force", columns[:, n], v.size) for n in range(shape[1])])
+        else:
+            forces = numbers("force", force, v.size)[:, np.newaxis]
+        count = 1 if values is None else values.size
+        if forces.shape[1] != count:
+            raise ValueError(
+                f"force: {forces.shape[1]} columns for {count} values of the {signal.name}; give one for each"
+            )
+        return CurveDamper(curve_of(v, forces, values, int(sign)), signal)
+
     @property
     def effects(self) -> dict[str, dict[str, float | tuple[float, ...]]]:
         """Parameters of each effect by its name."""
@@ -122,6 +167,11 @@ class Damper(Result):
         TypeError, ValueError : when an argument is no such array, time does not increase, or the voltage is missing
         """
         from pzd.damper.compose import respond
+
+        return respond(self.model, self.motion(time, displacement, voltage, temperature, velocity))
+
+    def motion(self, time: Any, displacement: Any, voltage: Any, temperature: Any, velocity: Any) -> Motion:
+        """Return a motion with control signal and temperature, as `force` takes them."""
         from pzd.damper.motion import Motion
         from pzd.record import clock_fault
         from pzd.signals.cycles import cycles
@@ -138,8 +188,7 @@ class Damper(Result):
         channels = [
             self._channel(name, value, t.size) for name, value in (("voltage", voltage), ("temperature", temperature))
         ]
-        motion = Motion(t, x, clean.velocity if v is None else v, clean.acceleration, *channels)
-        return respond(self.model, motion)
+        return Motion(t, x, clean.velocity if v is None else v, clean.acceleration, *channels)
 
     @in_python
     def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:
@@ -184,6 +233,13 @@ class Damper(Result):
             )
         return known[0] if known else None
 
+    def _reached(self) -> float:
+        """Return up to which speed the curve is drawn [m/s]: that of the records behind it."""
+        from pzd.artefacts import Rig
+
+        records = self.behind.of(Rig).records if self.behind is not None else ()
+        return max((float(np.max(np.abs(record.velocity))) for record in records), default=_FASTEST)
+
     @override
     def lines(self) -> list[str]:
         rows = self.model.base
@@ -209,7 +265,7 @@ class Damper(Result):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the steady force over velocity, a line for each control signal."""
         ax = new_axes(ax)
-        fastest = reached(self.behind)
+        fastest = self._reached()
         for voltage in self.voltages or (None,):
             for side in (-1.0, 1.0):  # the friction jumps at rest
                 v = side * np.linspace(0.0, fastest, _DRAWN // 2)
@@ -222,12 +278,66 @@ class Damper(Result):
         return ax
 
 
-def reached(behind: InMemory | None) -> float:
-    """Return the largest speed of the records behind a damper [m/s]; 1 where there are none."""
-    from pzd.artefacts import Rig
+class CurveDamper(Damper):
+    """A damper that is known by its measured curve alone, see `Damper.from_curve`."""
 
-    records = behind.of(Rig).records if behind is not None else ()
-    return max((float(np.max(np.abs(record.velocity))) for record in records), default=_FASTEST)
+    def __init__(self, measured: ForceCurve, control: Control) -> None:
+        """Keep a curve."""
+        self.control, self.behind, self.measured = control, None, measured
+
+    @property
+    @override
+    def effects(self) -> dict[str, dict[str, float | tuple[float, ...]]]:
+        return {}
+
+    @property
+    @override
+    def voltages(self) -> tuple[float, ...]:
+        return tuple(self.measured.voltages.tolist()) if self.measured.has_voltage else ()
+
+    @property
+    @override
+    def temperatures(self) -> tuple[float, ...]:
+        return ()
+
+    @override
+    def _reached(self) -> float:
+        return float(np.max(np.abs(self.measured.velocity)))
+
+    @override
+    @in_python
+    def force(
+        self, time: Any, displacement: Any, voltage: Any = None, temperature: Any = None, velocity: Any = None
+    ) -> Array:
+        """Compute the force along a motion, which is that of the curve at its velocity; see `Damper.force`."""
+        motion = self.motion(time, displacement, None, None, velocity)
+        return self.curve(motion.velocity, voltage)
+
+    @override
+    @in_python
+    def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:
+        v = numbers("velocity", velocity)
+        u = self._label("voltage", voltage, v.size)
+        return self.measured.at(v, 0.0 if u is None else u)
+
+    @override
+    def lines(self) -> list[str]:
+        low, high = self.measured.velocity[[0, -1]]
+        at = f", {len(self.voltages)} values of the {self.control.name}" if self.voltages else ""
+        return [f"Damper by its measured curve: {self.measured.velocity.size} points, {low:g} to {high:g} m/s{at}"]
+
+    @override
+    def to_frame(self) -> pd.DataFrame:
+        """Return the points, a row each."""
+        import pandas as pd
+
+        key = self.control.renamed("voltage_V")
+        rows = [
+            {key: voltage, VELOCITY.column: v, FORCE.column: force}
+            for n, voltage in enumerate(self.voltages or (np.nan,))
+            for v, force in zip(self.measured.velocity, self.measured.force[:, n], strict=True)
+        ]
+        return pd.DataFrame(rows)
 
 
 def _shown(value: float | tuple[float, ...]) -> str:
@@ -312,6 +422,10 @@ def table_stage(damper: Any, keys: Mapping[str, Any]) -> Table:
             f"damper: must be a pzd.Damper, such as found.damper of pzd.diagnose (got {type(damper).__name__})"
         )
     block = config_of(damper.control, table=keys).table
+    if isinstance(damper, CurveDamper):
+        from pzd.force_table.measured_curve import table_of_curve
+
+        return table_of_curve(block, damper.measured)
     if damper.behind is None:
         return untested_table(block, damper.model, damper.control)
     behind = damper.behind

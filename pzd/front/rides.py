@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from pzd.artefacts import Diagnosed, Rides, SummaryRow, WeightedRow
 from pzd.front.arguments import in_python
-from pzd.front.dampers import Damper, table_stage
+from pzd.front.dampers import CurveDamper, Damper, table_stage
 from pzd.front.pipelines import config_of
 from pzd.front.results import Result, new_axes
 from pzd.quantities import Control
@@ -108,7 +108,8 @@ def ride(
 
     Parameters
     ----------
-    damper : the damper at both axles
+    damper : the damper at both axles, or a pair, front (axle 1) and rear; where one is known by its measured curve the
+        ride goes by the tables of both, whatever the fidelity says
     road : "sine" (2.25 Hz, 0.02 m), the kind of another one whose keys all have defaults, or its block in a config,
         such as {"kind": "sine", "frequency_Hz": 4.5}
     policy : how the dampers are controlled, as in `simulate.policies`
@@ -126,10 +127,15 @@ def ride(
     ValueError : when a value is none that a config may have, or the damper cannot be ridden so
     """
     from pzd.simulate.config import SimulateConfig
-    from pzd.simulate.stage import simulate
+    from pzd.simulate.stage import simulate, simulate_on_axles
 
-    if not isinstance(damper, Damper):
-        raise TypeError(f"damper: must be a pzd.Damper (got {type(damper).__name__})")
+    axles = tuple(damper) if isinstance(damper, tuple | list) else (damper,)
+    wrong = next((type(one).__name__ for one in axles if not isinstance(one, Damper)), None)
+    if wrong is not None or len(axles) not in (1, 2):
+        raise TypeError(f"damper: must be a pzd.Damper, or a pair of them, front and rear (got {wrong or len(axles)})")
+    front = axles[0]
+    if any(one.control != front.control for one in axles):
+        raise ValueError("damper: front and rear have control signals of other names or units; give both the same")
     for name, value in (("policy", policy), ("fidelity", fidelity)):
         if not isinstance(value, str):
             raise TypeError(f"{name}: must be text (got {type(value).__name__})")
@@ -146,7 +152,9 @@ def ride(
         raise TypeError(f"duration: must be a number (got {type(duration).__name__})")
     if duration <= settle:
         block["settle_s"] = round(0.5 * duration, 3)
-    config = config_of(damper.control, simulate={**block, **keys_of_the_block}, seed=seed).simulate
-    table = table_stage(damper, {})
-    alone = Diagnosed.undiagnosed(damper.model)
-    return CarRide(simulate(config, alone, table, seed, Path(), jobs), damper.control)
+    config = config_of(front.control, simulate={**block, **keys_of_the_block}, seed=seed).simulate
+    if len(axles) == 1 and not isinstance(front, CurveDamper):
+        alone = Diagnosed.undiagnosed(front.model)
+        return CarRide(simulate(config, alone, table_stage(front, {}), seed, Path(), jobs), front.control)
+    mounted = [(None if isinstance(one, CurveDamper) else one.model, table_stage(one, {})) for one in axles]
+    return CarRide(simulate_on_axles(config, mounted, seed, Path(), jobs), front.control)

@@ -12,7 +12,13 @@ from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from pzd.artefacts import Response
+    from pzd.damper.model import Damper
     from pzd.simulate.roads import Profile
+    from pzd.simulate.study.plan import Case
+    from pzd.simulate.study.tuning import Setup
 
 
 def simulate(
@@ -36,7 +42,6 @@ def simulate(
     DataError : when a ride needs the table where it ends
     """
     from pzd.simulate.ride.model import check_inertance, dynamic_damper_of, grid_of, table_of
-    from pzd.simulate.study.gathering import Gathering
     from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
     from pzd.simulate.study.response import responses
     from pzd.simulate.study.tuning import Setup
@@ -56,10 +61,81 @@ def simulate(
         check_inertance(dynamic, simulate.car.car())
         setups[plain] = Setup(simulate, profiles, grid, dynamic, table.notes.outside == "error")
 
+    answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
+    return _ridden(simulate, planned, setups, answered, with_voltage=with_voltage, jobs=jobs)
+
+
+def simulate_on_axles(
+    simulate: SimulateConfig, axles: Sequence[tuple[Damper | None, Table]], seed: int, folder: Path, jobs: int = 1
+) -> Rides:
+    """Ride every case of the config with a damper of its own at each axle.
+
+    A damper that is known by its table alone, as a measured curve is, has no oil spring and no valve: where one is
+    among them, what would be ridden `dynamic` is ridden by the tables.
+
+    Parameters
+    ----------
+    simulate : the config's block
+    axles : damper and table of axle 1, and of axle 2 where it is another one; None for a damper known by its table
+    seed, folder, jobs : as `simulate`
+
+    Raises
+    ------
+    ConfigError : as `simulate` does; and when one of two dampers has a control signal and the other has none, or a
+        policy predicts one damper at both axles
+    DataError : as `simulate` does
+    """
+    from pzd.simulate.ride.model import check_inertance, dynamic_damper_of, grid_of
+    from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
+    from pzd.simulate.study.tuning import Setup
+
+    config, controlled, mounted = simulate, [], []
+    if any(damper is None for damper, _ in axles):
+        fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
+        config = simulate.model_copy(update={"fidelities": fidelities})
+    for damper, table in axles:
+        controlled.append(all(row.voltage_V is not None for row in table.force))
+        checked_voltage(config, table)
+        temperature = checked_temperature(config, table)
+        dynamic = dynamic_damper_of(damper or _never_asked(table), temperature, config.valve_response_s)
+        check_inertance(dynamic, config.car.car())
+        mounted.append((grid_of(table, temperature), dynamic))
+    if len(set(controlled)) > 1:
+        raise ConfigError("damper: that of one axle has a control signal, and that of the other has none")
+    planned = cases(config, controlled[0], changed=False)
+    foreseeing = [case.policy.name for case in planned if case.policy.aim in ("predict", "schedule")]
+    if foreseeing and len(axles) > 1:
+        raise ConfigError(f"simulate.policies: {foreseeing[0]} knows one damper at both axles, and there are two")
+    ends = any(table.notes.outside == "error" for _, table in axles)
+    rear = mounted[1] if len(mounted) > 1 else None
+    setup = Setup(config, profiles_of(config, seed, folder), *mounted[0], ends, rear)
+    return _ridden(config, planned, {False: setup}, (), with_voltage=controlled[0], jobs=jobs)
+
+
+def _never_asked(table: Table) -> Damper:
+    """Return what the kernels want where only a table is ridden: they ask it for no force."""
+    from pzd.damper.model import PHYSICAL, BaseRow, Damper
+
+    row = BaseRow(T0_N=0.0, C_Ns_per_m=1.0, k_N_per_m=PHYSICAL["k_N_per_m"][1])
+    voltages = dict.fromkeys(row.voltage_V for row in table.force)
+    return Damper(base=tuple(row.model_copy(update={"voltage_V": voltage}) for voltage in voltages))
+
+
+def _ridden(
+    simulate: SimulateConfig,
+    planned: tuple[Case, ...],
+    setups: Mapping[bool, Setup],
+    answered: tuple[Response, ...],
+    *,
+    with_voltage: bool,
+    jobs: int,
+) -> Rides:
+    """Ride the cases, on the damper before diagnose and on that after."""
+    from pzd.simulate.study.gathering import Gathering
+
     gathering = Gathering(simulate, with_voltage)
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         rides = list(pool.map(lambda case: gathering.of_ride(case, setups[case.plain].ridden), planned))
-    answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
     return gathering.all(planned, rides, answered)
 
 

@@ -119,7 +119,7 @@ CHANGES = {
     "force of the wrong sign": ({"force": lambda a: -a["force"]}, ValueError, r"pass force=-force"),
     "millimetres": ({"displacement": lambda a: 1000.0 * a["displacement"]}, ValueError, r"pass displacement in SI"),
     "decreasing time": ({"time": lambda a: a["time"][::-1]}, ValueError, "time does not increase"),
-    "lengths": ({"force": lambda a: a["force"][:-1]}, ValueError, "as many as there are times"),
+    "lengths": ({"force": lambda a: a["force"][:-1]}, ValueError, "as many as the first array"),
     "NaN": ({"force": lambda a: np.where(a["time"] > 3.0, np.nan, a["force"])}, ValueError, "index 1501"),
     "masked": ({"force": lambda a: np.ma.masked_greater(a["force"], 300.0)}, ValueError, "no finite number"),
     "two columns": ({"force": lambda a: np.column_stack([a["force"]] * 2)}, ValueError, "one column"),
@@ -285,7 +285,7 @@ def test_a_voltage_may_be_a_number_or_move_and_must_be_given_where_it_matters(hi
         hidden.force(time, x)
     with pytest.raises(ValueError, match="time does not increase"):
         hidden.force(time[::-1], x, voltage=1.5)
-    with pytest.raises(ValueError, match="as many as there are times"):
+    with pytest.raises(ValueError, match="as many as the first array"):
         hidden.force(time, x[:-1], voltage=1.5)
     single = pzd.Damper({"T0_N": 300.0, "C_Ns_per_m": 2700.0, "k_N_per_m": 2e5})
     assert single.curve([1.0])[0] == pytest.approx(3000.0)

@@ -78,6 +78,8 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
         control_spec_of(config, case, car, dynamic, FixedValues(voltage, 0.0)),
         grid,
         dynamic,
+        grid,
+        dynamic,
     )
     return model, predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages)
 

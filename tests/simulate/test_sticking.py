@@ -67,6 +67,8 @@ def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, 
         control_spec_of(config, case, car, dynamic, FixedValues(0.0, 0.0)),
         grid,
         dynamic,
+        grid,
+        dynamic,
     )
     y, ride = at_rest(model.car), ride_of(model)
     room = ride.workspace

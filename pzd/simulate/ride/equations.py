@@ -19,9 +19,11 @@ from pzd.simulate.ride.model import (
     State,
     TableArrays,
     Vehicle,
+    damper_at,
     effective_voltage,
     elastic_force,
     flowing,
+    grid_at,
     inertance,
     parallel_at,
     remember,
@@ -128,9 +130,9 @@ def quasistatic_forces(y: Array, ride: RunningRide) -> None:
             velocity = one_sided(velocity, control[Command.SIDE, i])
         workspace[Axle.SIDED_RATE, i] = velocity
         if control_spec.fidelity == TABLE:
-            workspace[Axle.FORCE, i] = tabled(model.car, model.grid, i, control[Command.SET, i], velocity)
+            workspace[Axle.FORCE, i] = tabled(model.car, grid_at(model, i), i, control[Command.SET, i], velocity)
         else:
-            low_high = bounds_of(control_spec, model.car, model.grid, i, velocity)
+            low_high = bounds_of(control_spec, model.car, grid_at(model, i), i, velocity)
             workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = low_high
     if control_spec.fidelity == TABLE:
         return
@@ -176,17 +178,18 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 @inlined
 def valve_voltage(time: float, ride: RunningRide, axle: int) -> float:
     """Return the effective voltage of the dampers of an axle [V] at a time [s]."""
-    control = ride.control
+    control, damper = ride.control, damper_at(ride.model, axle)
     elapsed = time - control[Command.SINCE, 0]
-    return effective_voltage(ride.model.damper, control[Command.SET, axle], control[Command.BEHIND :, axle], elapsed)
+    return effective_voltage(damper, control[Command.SET, axle], control[Command.BEHIND :, axle], elapsed)
 
 
 @inlined
 def dynamic_forces(time: float, y: Array, ride: RunningRide) -> None:
     """Fill the workspace's forces from where the oil has flowed to."""
     model, control, workspace = ride
-    car, damper = model.car, model.damper
+    car = model.car
     for i in range(2):
+        damper = damper_at(model, i)
         ratio, n = car.ratio[i], car.dampers[i]
         voltage = valve_voltage(time, ride, i)
         row = row_at(damper.voltages, damper.rows, voltage)
@@ -220,8 +223,8 @@ def dynamic_forces(time: float, y: Array, ride: RunningRide) -> None:
 def remember_step(time: float, ride: RunningRide) -> None:
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
     model, workspace = ride.model, ride.workspace
-    damper = model.damper
     for i in range(2):
+        damper = damper_at(model, i)
         parallel_at(damper, valve_voltage(time, ride, i), damper.scratch)
         remember(damper, i, model.car.ratio[i] * workspace[Axle.DEFLECTION, i], damper.scratch)
 
@@ -362,11 +365,14 @@ def oil_energy(time: float, y: Array, ride: RunningRide) -> float:
     ride : its workspace is changed
     """
     model, workspace = ride.model, ride.workspace
-    car, damper, energy = model.car, model.damper, 0.0
-    if model.control_spec.fidelity != DYNAMIC or damper.rigid:
+    car, energy = model.car, 0.0
+    if model.control_spec.fidelity != DYNAMIC:
         return energy
     suspension(time, y, car, model.road_coefficients, workspace)
     for i in range(2):
+        damper = damper_at(model, i)
+        if damper.rigid:
+            continue
         row = row_at(damper.voltages, damper.rows, valve_voltage(time, ride, i))
         e = car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
         energy += car.dampers[i] * spring_energy(e, row, row[K])

@@ -28,6 +28,8 @@ from pzd.simulate.ride.model import (
     RideModel,
     RunningRide,
     State,
+    damper_at,
+    grid_at,
     place,
 )
 from pzd.simulate.ride.stepper import STAGES, Integrator, advance, choose_side
@@ -59,7 +61,7 @@ def _choose_ends(y: Array, ride: RunningRide) -> None:
     control_spec, car = model.control_spec, model.car
     for i in range(2):
         velocity = workspace[Axle.SIDED_RATE, i] = workspace[Axle.RATE, i]
-        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(control_spec, car, model.grid, i, velocity)
+        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(control_spec, car, grid_at(model, i), i, velocity)
     if control_spec.aim == SWITCH:
         choose_hardness(y, ride)
     if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
@@ -134,7 +136,7 @@ def _wanted_voltage(time: float, ride: RunningRide, axle: int) -> float:
 @inlined
 def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
     """Look up the voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
-    grid, car = model.grid, model.car
+    grid, car = grid_at(model, axle), model.car
     ratio = car.ratio[axle]
     alone = force / (car.dampers[axle] * ratio)
     for share in (0.0, 1e-12, -1e-12):
@@ -149,11 +151,11 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 @compiled
 def _set_voltage(time: float, ride: RunningRide, electronics: Electronics | None, axle: int, asked: float) -> None:
     """Set the voltage of an axle as the supply can, and note what stands behind each drive effect then."""
-    control, voltages, before = ride.control, ride.model.grid.voltages, ride.control[Command.SET, axle]
+    control, voltages, before = ride.control, grid_at(ride.model, axle).voltages, ride.control[Command.SET, axle]
     elapsed, voltage = time - control[Command.SINCE, 0], asked
     if electronics is not None:
         voltage = supplied(asked, before, voltages[0], voltages[-1], electronics)
-    keep_voltage(before, elapsed, control[Command.BEHIND :, axle], ride.model.damper.drive)
+    keep_voltage(before, elapsed, control[Command.BEHIND :, axle], damper_at(ride.model, axle).drive)
     control[Command.SET, axle] = voltage
 
 
@@ -206,9 +208,10 @@ def beyond_reach(ride: RunningRide) -> bool:
     `ideal` has no damper: there the fastest at any voltage counts, and no stroke.
     """
     model, control, workspace = ride
-    grid, car = model.grid, model.car
-    last = grid.reach.size - 1
+    car = model.car
     for i in range(2):
+        grid = grid_at(model, i)
+        last = grid.reach.size - 1
         n, share = place(grid.voltages, control[Command.SET, i])
         reach = grid.reach[n] + share * (grid.reach[min(n + 1, last)] - grid.reach[n])
         if model.control_spec.fidelity == IDEAL:

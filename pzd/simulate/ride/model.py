@@ -273,7 +273,13 @@ class RideModel(NamedTuple):
     road_coefficients: RoadCoefficients
     control_spec: ControlSpec
     grid: TableArrays
+    """Of axle 1."""
     damper: DynamicDamper
+    """Of axle 1."""
+    rear_grid: TableArrays
+    """Of axle 2."""
+    rear_damper: DynamicDamper
+    """Of axle 2."""
 
 
 class RunningRide(NamedTuple):
@@ -284,6 +290,18 @@ class RunningRide(NamedTuple):
     """(BEHIND + d, 2) what the controller last did, see `Command`."""
     workspace: Array
     """(WORKSPACE_ROWS, 2) intermediate results, see `Axle`."""
+
+
+@inlined
+def grid_at(model: RideModel, axle: int) -> TableArrays:
+    """Return the table of the dampers of an axle."""
+    return model.grid if axle == 0 else model.rear_grid
+
+
+@inlined
+def damper_at(model: RideModel, axle: int) -> DynamicDamper:
+    """Return the damper of an axle."""
+    return model.damper if axle == 0 else model.rear_damper
 
 
 def vehicle(car: HalfCar, speed: float) -> Vehicle:

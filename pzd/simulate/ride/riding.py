@@ -129,6 +129,7 @@ def ride_case(
     ends: bool,
     fixed: FixedValues | None = None,
     sink: CourseSink | None = None,
+    rear: tuple[TableArrays, DynamicDamper] | None = None,
 ) -> Outcome:
     """Ride one case.
 
@@ -141,6 +142,7 @@ def ride_case(
     ends : whether the table ends where the rig did, so that a ride beyond is refused
     fixed : what the policy holds constant; by default what the config says
     sink : receives the course piece by piece, so that the outcome has none; by default it has all of it
+    rear : the damper of axle 2 likewise, where it is another one
 
     Returns
     -------
@@ -156,11 +158,13 @@ def ride_case(
     linear = sink is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
     if linear and profile.smooth:
         return ride_exactly(car, fixed.damping, profile, speed, clock, float(np.max(grid.reach)))
-    own = damper._replace(  # rides at the same time each have a memory and a scratch row of their own
-        scratch=np.zeros_like(damper.scratch), memory=np.zeros_like(damper.memory)
-    )
+    own, (rear_grid, behind) = _with_own_memory(damper), rear or (grid, damper)
+    behind = own if rear is None else _with_own_memory(behind)
     spec = control_spec_of(config, case, car, damper, fixed)
-    model = RideModel(vehicle(car, speed), road_coefficients(profile, car.wheelbase), spec, grid, own)
+    if rear is not None:
+        spec = spec._replace(jumps=spec.jumps or control_spec_of(config, case, car, behind, fixed).jumps)
+    way = road_coefficients(profile, car.wheelbase)
+    model = RideModel(vehicle(car, speed), way, spec, grid, own, rear_grid, behind)
     y, ride = at_rest(model.car), ride_of(model)
     plan = None
     if case.policy.aim == "predict":
@@ -195,6 +199,11 @@ def ride_case(
         outside=float(records.tally[OUTSIDE] / count),
         energy_error=balance_error(change, oil_change, y, float(records.tally[FLOWED])),
     )
+
+
+def _with_own_memory(damper: DynamicDamper) -> DynamicDamper:
+    """Return a damper for one ride: those at the same time each have a memory and a scratch row of their own."""
+    return damper._replace(scratch=np.zeros_like(damper.scratch), memory=np.zeros_like(damper.memory))
 
 
 def _lost(name: str, time: float, ends: bool, speed: float) -> str:

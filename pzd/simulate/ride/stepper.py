@@ -242,7 +242,7 @@ def advance(time: float, h: float, y: Array, ride: RunningRide, integrator: Inte
         done += dt
         if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride_steps`
             return h
-        if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
+        if (model.damper.slips or model.rear_damper.slips) and model.control_spec.fidelity == DYNAMIC:
             remember_step(time + done, ride)
         turned = False
         if model.control_spec.jumps:

@@ -222,6 +222,8 @@ class Setup:
     damper: DynamicDamper
     ends: bool
     """Whether the table ends where the rig did."""
+    rear: tuple[TableArrays, DynamicDamper] | None = None
+    """Of axle 2, where its damper is another one."""
 
     def ridden(self, case: Case, sink: CourseSink | None = None) -> tuple[FixedValues, Outcome]:
         """Ride one case, and return what its policy holds constant beside the ride; see `ride_case` for `sink`.
@@ -243,7 +245,8 @@ class Setup:
         return fixed, self._ride(self.config, case, fixed, sink)
 
     def _ride(self, config: SimulateConfig, case: Case, fixed: FixedValues, sink: CourseSink | None = None) -> Outcome:
-        return ride_case(config, case, self.profiles[case.road.name], self.grid, self.damper, self.ends, fixed, sink)
+        road = self.profiles[case.road.name]
+        return ride_case(config, case, road, self.grid, self.damper, self.ends, fixed, sink, self.rear)
 
     def _best_found(self, case: Case) -> tuple[FixedValues, Outcome]:
         """Find the most comfortable of the other policies and of searched schedules, within the bound on the load."""
