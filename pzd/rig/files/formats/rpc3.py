@@ -67,7 +67,8 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
         name = head.get(f"DESC.CHAN_{n + 1}") or f"channel {n + 1}"
         scale = _real(path, head, f"SCALE.CHAN_{n + 1}") if kind == "i2" else 1.0
         called = name if name not in columns else f"{name}.{n + 1}"
-        columns[called] = (scale * by_channel[n].astype(np.float64), head.get(f"UNITS.CHAN_{n + 1}", ""))
+        with np.errstate(invalid="ignore"):  # damaged numbers of 32 bits, refused with their rows
+            columns[called] = (scale * by_channel[n].astype(np.float64), head.get(f"UNITS.CHAN_{n + 1}", ""))
     units = tuple(unit for _, unit in columns.values())
     return [FileTable("", tuple(columns), tuple(cells for cells, _ in columns.values()), units, clock=CLOCK)]
 
