@@ -84,6 +84,10 @@ nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of 
 plain-study: $(DEV)  ## Measure 600 plain dampers from everywhere: whether pzd says that nothing is missing; an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/plain_study.py --jobs $(JOBS)
 
+.PHONY: fuzz
+fuzz: $(DEV)  ## Read damaged files of every format, and texts as units: only refusals may come of it; 15 minutes
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests:tests/rig $(BIN)/python tests/studies/fuzz.py
+
 .PHONY: sensitivity
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py

@@ -137,6 +137,19 @@ def lvm(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) -
     write(path, [*above, end, "", "Channels\t3", samples, said, end, heads, *lines(columns, "\t")[1:]])
 
 
+def rpc3(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) -> None:
+    """Of 32 bits, all in one group."""
+    channels = {head: values for head, values in columns.items() if head != "time"}
+    said: dict[str, Any] = {"FORMAT": "BINARY_IEEE_LITTLE_END", "NUM_HEADER_BLOCKS": 5, "FILE_TYPE": "TIME_HISTORY"}
+    said |= {"DELTA_T": 2e-3, "CHANNELS": len(channels), "PTS_PER_FRAME": TIME.size, "PTS_PER_GROUP": TIME.size}
+    said |= {"FRAMES": 1, "DATA_TYPE": "FLOATING_POINT"}
+    for n, head in enumerate(channels, start=1):
+        said |= {f"DESC.CHAN_{n}": head, f"UNITS.CHAN_{n}": units[head]}
+    head = b"".join(key.encode().ljust(32, b"\0") + str(value).encode().ljust(96, b"\0") for key, value in said.items())
+    data = b"".join(np.asarray(values, dtype="<f4").tobytes() for values in channels.values())
+    path.write_bytes(head.ljust(5 * 512, b"\0") + data)
+
+
 WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "excel": ("a.xlsx", excel, NAMED | {"units_row": True}),
     "parquet": ("a.parquet", parquet, NAMED),
@@ -150,6 +163,7 @@ WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "tdms": ("a.tdms", tdms, NAMED),
     "mdf": ("a.mf4", mdf, NAMED),
     "mts": ("a.dat", mts, NAMED),
+    "rpc3": ("a.rsp", rpc3, NAMED),
     "lvm": ("a.lvm", lvm, {"columns": NAMED["columns"] | {"time": "X_Value"}}),
 }
 every_format = pytest.mark.parametrize("name", WRITERS)
@@ -166,7 +180,7 @@ def test_every_value_of_a_format_is_read(tmp_path: Path, name: str) -> None:
     rig = run(tmp_path, {"path": file} | entry)
     (record,) = rig.records
     assert record.voltage is not None
-    exact = 1e-8 if name in ("mts", "lvm") else 1e-15  # text of nine digits
+    exact = {"mts": 1e-8, "lvm": 1e-8, "rpc3": 1e-6}.get(name, 1e-15)  # text of nine digits, numbers of 32 bits
     assert record.time == pytest.approx(TIME, abs=exact)
     assert record.displacement == pytest.approx(X, abs=exact)
     assert record.force == pytest.approx(FORCE, abs=max(exact, 1e-12) * 1e2)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from importlib import import_module
@@ -214,3 +216,19 @@ def test_a_module_beside_the_files_is_not_taken_for_a_library(tmp_path: Path, mo
     monkeypatch.chdir(tmp_path)
     assert read(Path("a.mat"))[0].rows == 6
     assert not Path("executed").exists()
+
+
+@pytest.mark.ci
+def test_damaged_files_and_texts_as_units_are_read_or_refused_and_nothing_else(root: Path) -> None:
+    """A short run of `make fuzz`."""
+    paths = os.pathsep.join(str(root / part) for part in (".", "tests", "tests/rig"))
+    done = subprocess.run(
+        [sys.executable, root / "tests/studies/fuzz.py", "--seconds", "30"],
+        env=os.environ | {"PYTHONPATH": paths},
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300.0,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
