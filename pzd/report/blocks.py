@@ -221,6 +221,8 @@ class Opening:
 
     answer: str
     pictures: tuple[Picture, ...] = ()
+    about: tuple[tuple[str, str], ...] = ()
+    """What the user says of the damper and its tests, by name."""
 
 
 # --- Rows of pictures ---

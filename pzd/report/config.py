@@ -27,6 +27,8 @@ class ReportConfig(Frozen):
     its limits, so none is used unless one is chosen here."""
     records_shown: int = Field(default=3, ge=1, le=12)
     """How many rig records the page shows as measured and simulated force, spread over the voltages."""
+    about: Mapping[str, str | int | float] = {}
+    """What the head of the page says, in words of your own: damper, serial number, operator, date, calibration."""
     reference: str | None = None
     """Expected numbers that reference.csv sets beside those of the run: a CSV file, or `makowski2021`, the
     numbers that the paper prints. pzd/report/reference.py says what stands in such a file."""

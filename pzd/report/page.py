@@ -264,7 +264,8 @@ def page(context: ReportContext, jobs: int = 1) -> str:
     title = ": ".join(
         filter(None, ("Damper and comfort report" if context.ridden else "Damper report", context.setting))
     )
-    first = Opening(answer(context), tuple(picture for row in drawn["answer"] for picture in row))
+    about = tuple((name, str(value)) for name, value in context.config.about.items())
+    first = Opening(answer(context), tuple(picture for row in drawn["answer"] for picture in row), about)
     return render(title, cards(context), _assumed(context), sections, opening=first, explorer=explorer_of(context))
 
 

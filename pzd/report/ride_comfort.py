@@ -18,12 +18,10 @@ from pzd.schema.errors import DataError
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.roads.sine import Sine
-from pzd.simulate.study.plan import PLAIN_SUFFIX
+from pzd.simulate.study.plan import PLAIN_SUFFIX, REALISTIC
 
 UNWEIGHTED = "unweighted"
 """Edition of the rows that follow no standard."""
-REALISTIC = ("dynamic", "table", "ideal")
-"""Fidelities, the one nearest to a real car first."""
 UNCONTROLLED = ("best_fixed_voltage", "best_constant_c", "passive", "constant")
 """Policies that a controlled one is compared with, the strongest first."""
 _FEWEST_CONTROLLED = 2

@@ -251,6 +251,9 @@ class SimulateConfig(Frozen):
     histories: History = "csv"
     """How the history of each ride is written: `csv`, `parquet` (half the size, with `pip install pzd[formats]`)
     or `none`, where the numbers are enough; the report then draws no acceleration over time."""
+    keep: Literal["drawn", "all"] = "drawn"
+    """Which histories are written: those that the report draws (the adopted damper, at the fidelity nearest to a car
+    that was ridden over the road), or those of all rides."""
 
     @field_validator("policies")
     @classmethod

@@ -33,7 +33,8 @@ addEventListener("load", async () => {
   const move = async (plot, x, y) => {
     const box = plot.getBoundingClientRect();
     const at = {clientX: box.left + x * box.width, clientY: box.top + y * box.height, bubbles: true, composed: true};
-    plot.dispatchEvent(new inside.PointerEvent("pointermove", {...at, pointerType: "mouse", pointerId: 1, isPrimary: true}));
+    const mouse = {pointerType: "mouse", pointerId: 1, isPrimary: true};
+    plot.dispatchEvent(new inside.PointerEvent("pointermove", {...at, ...mouse}));
     await wait(300);
     seen.told.push(says());
   };

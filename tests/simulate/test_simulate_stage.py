@@ -40,7 +40,7 @@ def unvoiced(damper: Damper) -> Damper:
 
 
 def test_a_case_is_road_policy_fidelity(damper) -> None:
-    rides = ride(damper)
+    rides = ride(damper, keep="all")
     assert [row.case for row in rides.summary] == [
         f"sine-2.25Hz-{policy}-{fidelity}"
         for policy in ("constant", "best_constant_c", "passive", "best_fixed_voltage", "comfort")
@@ -111,7 +111,7 @@ def test_a_clamped_table_holds_the_force_and_the_share_beyond_is_said(damper) ->
 
 
 def test_the_files_read_back_as_they_were_written(damper, tmp_path) -> None:
-    rides = ride(damper, policies=["comfort"], fidelities=["ideal", "table"])
+    rides = ride(damper, policies=["comfort"], fidelities=["ideal", "table"], keep="all")
     rides.write(tmp_path, Control())
     again = Rides.read(tmp_path, Control())
     assert again.summary == rides.summary
@@ -137,7 +137,7 @@ def test_histories_in_parquet_read_back_as_those_in_csv_do(damper, tmp_path: Pat
     read = {}
     for kind in ("csv", "parquet"):
         (tmp_path / kind).mkdir()
-        ride(damper, policies=["comfort"], histories=kind).write(tmp_path / kind, Control("current", "A"))
+        ride(damper, policies=["comfort"], histories=kind, keep="all").write(tmp_path / kind, Control("current", "A"))
         assert len(list((tmp_path / kind).glob(f"sine-*.{kind}"))) == 3
         read[kind] = Rides.read(tmp_path / kind, Control("current", "A"))
     assert not list((tmp_path / "parquet").glob("sine-*.csv"))
@@ -154,6 +154,18 @@ def test_histories_that_are_not_wanted_are_not_written_and_all_numbers_stay(damp
     without.write(tmp_path, Control())
     assert not list(tmp_path.glob("sine-*"))
     assert Rides.read(tmp_path, Control()).ridden == without.ridden
+
+
+def test_histories_are_those_that_the_report_draws_or_all_and_every_number_stays(damper) -> None:
+    """Of these dynamic is nearest to a car; where that is not ridden the report draws what is."""
+    drawn, every = (ride(damper, policies=["comfort", "passive"], keep=keep) for keep in ("drawn", "all"))
+    assert {one.case for one in drawn.rides} == {
+        row.case for row in drawn.summary if row.fidelity == "dynamic" and not row.case.endswith("-plain")
+    }
+    assert {one.case for one in every.rides} == {row.case for row in every.summary}
+    assert (drawn.summary, drawn.weighted, drawn.spectrum) == (every.summary, every.weighted, every.spectrum)
+    ideal = ride(damper, policies=["constant"], fidelities=["ideal"])
+    assert {one.case for one in ideal.rides} == {row.case for row in ideal.summary}
 
 
 def test_parquet_without_its_library_is_refused_before_anything_is_ridden(

@@ -27,9 +27,9 @@ from pzd.report.blocks import (
 )
 from pzd.report.columns import Cell, Column, Table
 from pzd.report.context import ReportContext
-from pzd.report.ride_comfort import REALISTIC
 from pzd.simulate.config import Sensors, SimulateConfig
 from pzd.simulate.policies import policies
+from pzd.simulate.study.plan import REALISTIC
 from pzd.simulate.vehicle.car import modes
 
 _FIDELITIES = {

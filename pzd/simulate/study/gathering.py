@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -33,7 +33,7 @@ from pzd.simulate.ride.outcome import (
 )
 from pzd.simulate.ride.riding import CourseSink, FixedValues, SearchResult, clock_of
 from pzd.simulate.roads.sine import Sine
-from pzd.simulate.study.plan import Case
+from pzd.simulate.study.plan import Case, drawn
 
 log = logging.getLogger(__name__)
 
@@ -116,6 +116,10 @@ class RideRows:
     rows: WindowRows
     found: tuple[FoundRow, ...]
 
+    def without_history(self) -> RideRows:
+        """Return the same ride, whose history is not written."""
+        return replace(self, ridden=self.ridden.model_copy(update={"history": "none"}))
+
 
 class Gathering:
     """Evaluates the rides of a config, each as soon as its window is known; only its history and rows are kept.
@@ -173,7 +177,8 @@ class Gathering:
             event = event_of(road, self._config)
             if event is not None and over:
                 every |= self._over_event(event, [(c, *ride) for c, ride in over if not isinstance(ride, RideRows)])
-        found = [every[case.name] for case in planned]
+        kept = {case.name for case in planned} if self._config.keep == "all" else drawn(planned)
+        found = [every[case.name] if case.name in kept else every[case.name].without_history() for case in planned]
         return Rides(
             tuple(one.ride for one in found if one.ridden.history != "none"),
             tuple(one.rows.summary for one in found),

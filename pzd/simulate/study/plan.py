@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from pzd.artefacts import Table
@@ -173,6 +173,25 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
     if not found:
         raise ConfigError("simulate.fidelities: none of them can ride any of the policies; add table or dynamic")
     return tuple(found)
+
+
+REALISTIC: tuple[Fidelity, ...] = ("dynamic", "table", "ideal")
+"""Fidelities, the one nearest to a real car first."""
+
+
+def drawn(planned: Sequence[Case]) -> frozenset[str]:
+    """Return the names of the cases whose histories the report draws.
+
+    Of each road those on the adopted damper, at the fidelity nearest to a car at which a policy controls; where none
+    does, nearest of all.
+    """
+    names: set[str] = set()
+    for road in {case.road.name for case in planned}:
+        adopted = [case for case in planned if case.road.name == road and not case.plain]
+        controlled = [case for case in adopted if case.policy.controlled] or adopted
+        nearest = min((REALISTIC.index(case.fidelity) for case in controlled), default=0)
+        names |= {case.name for case in adopted if case.fidelity == REALISTIC[nearest]}
+    return frozenset(names)
 
 
 def _possible(road: Road, policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:

@@ -67,7 +67,9 @@ def accelerations(data: FigureData) -> Drawing:
         for (policy, (label, colour)), peak in zip(_CURVES.items(), printed, strict=True):
             row = data.ride(frequency, policy, "ideal")
             if row.case not in rides:
-                raise ConfigError("simulate.histories: Fig. 19 is drawn from them; say csv or parquet (got none)")
+                raise ConfigError(
+                    "simulate.keep: Fig. 19 is drawn from histories at the fidelity ideal; say all, and histories: csv"
+                )
             time = rides[row.case][_TIME]
             part = time >= time[-1] - _SHOWN
             ax.plot(time[part] - time[part][0], np.abs(rides[row.case][_ACCELERATION][part]), color=colour, label=label)
