@@ -78,24 +78,25 @@ def check_residual(
     without = residual - mains
     variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
-    late, shifted = predicted, _shifted(prepared, predicted)
+    force, shifted = record.force - mains, _shifted(prepared, predicted)
+
+    def explained_with(late: Array) -> Array:
+        """Return the (n,) part explained where a shifted prediction is the one that gain and offset act along [N]."""
+        size, timing = np.zeros(force.size), np.zeros(force.size)
+        left, own = (
+            (force - late)[mask],
+            (late[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask),
+        )
+        size[mask], timing[mask] = nuisance_forces(left, *own)
+        near_jumps = _nuisance_near_jumps(force, late, size, timing)
+        return late - predicted + np.where(mask & ~calm, near_jumps, size + timing)
+
+    ways = [explained_with(predicted)]
     if prepared.constant:
-        delay = likely_delay((record.force - mains)[mask], lambda d: shifted(d)[mask], variance, config, calm[mask])
-        late = shifted(delay) if abs(delay) * record.rate > 1.0 else predicted  # a lesser one goes along the slope
-    size, timing = np.zeros(residual.size), late - predicted
-    size[mask], further = nuisance_forces(
-        (record.force - mains - late)[mask],
-        late[mask],
-        record.rate,
-        variance,
-        config,
-        given.timing[mask],
-        calm[mask],
-        mask,
-    )
-    timing[mask] += further
-    near_jumps = _nuisance_near_jumps(record.force - mains, predicted, size, timing)
-    explained = mains + np.where(mask & ~calm, near_jumps, size + timing)
+        # A delay of more than a sample moves a flank; a jump between two samples it moves to chance.
+        delay = likely_delay(force[mask], lambda late: shifted(late)[mask], variance, config, calm[mask])
+        ways.append(explained_with(shifted(delay)))
+    explained = mains + min(ways, key=lambda way: float(np.sum((without - way)[mask] ** 2)))
     folded = _folded(prepared, residual - explained, mask)
     if folded is not None:
         found = _check_cycles(prepared, mask, residual, explained, folded, given.displacement_variance)
