@@ -265,7 +265,7 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
         log.info("diagnose: %s added, W_s of kept-back tests %.4g", _name(added[-1]), current.error.criterion)
     if not added:
         return adoption
-    lean = _without_replaced(current, validation, config.force)
+    lean = _without_off(_without_replaced(current, validation, config.force), validation, config.force)
     names = tuple(_name(each) for each in added if each.effect in lean.fitted.effects)
     if not names:
         return adoption
@@ -356,6 +356,22 @@ def _without_replaced(current: _CriterionFit, validation: CrossValidation, force
         problem, fitted, error = min(fewer, key=lambda each: each[2].criterion or 0.0)
         between = validation.interpolation_error(fitted.damper, by_criterion=True)
         current = _CriterionFit(problem, fitted, error, between)
+
+
+def _without_off(current: _CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> _CriterionFit:
+    """Remove effects that may as well be off beside what was added, whatever they predict; the rest is refitted.
+
+    Within the tests such an effect does little either way; beyond them, as a stop at the end of the stroke, anything.
+    """
+    while True:
+        shown = showing(current.fitted)
+        off = next((name for name in current.fitted.effects if name not in shown and name not in forced), None)
+        damper = current.fitted.damper.without_effects(off or "")
+        found = validation.fit_by_criterion(damper, validation.no_samples) if off else None
+        if found is None:
+            return current
+        between = validation.interpolation_error(found[1].damper, by_criterion=True)
+        current = _CriterionFit(*found, validation.error_by_criterion(damper), between)
 
 
 def _removable(fitted: FitResult) -> list[str]:

@@ -10,7 +10,7 @@ from synthetic import TWO, campaign_of, damper_of, problem_of, sine, sines
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnosis.adoption import adopt_effects
+from pzd.diagnosis.adoption import _CriterionFit, _without_off, adopt_effects
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import cross_validation_of
@@ -137,3 +137,15 @@ def test_no_test_brings_a_law_near_its_pole(rng: np.random.Generator) -> None:
         assert np.exp(start[1]) >= 1.5
     length = next(u for u in problem.unknowns(("accumulator",)) if u.parameter.name == "L")
     assert length.value(length.bounds[0]) == pytest.approx(1.5 * problem.scales.stroke)
+
+
+def test_what_may_be_off_beside_what_was_added_is_not_handed_on(rng: np.random.Generator) -> None:
+    true = damper_of((0.0,), gas_spring={"k_g": 6000.0})
+    validation = cross_validation_of(campaign_of([sine(true, 0.0, f, a, rng) for f, a in SEVERAL]), BASE, 0.0025)
+    both = true.with_effect("end_stop", {"k_e": 1e6, "x_e": 0.0295})
+    found = validation.fit_by_criterion(both, validation.no_samples)
+    assert found is not None
+    error = validation.error_by_criterion(both)
+    current = _CriterionFit(*found, error, error)
+    assert set(_without_off(current, validation, ()).fitted.effects) == {"gas_spring"}
+    assert set(_without_off(current, validation, ("end_stop",)).fitted.effects) == {"gas_spring", "end_stop"}
