@@ -72,6 +72,16 @@ true-dampers: $(DEV)  ## Hold the dampers of blind cases against their own recor
 bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour
 	$(BIN)/python tests/studies/bench.py
 
+.PHONY: changes-study
+changes-study: $(DEV)  ## Print how often `pzd changes` is right, on pairs of virtual dampers; ten minutes
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 40
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 20 --kind stand
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 20 --kind same
+
+.PHONY: planted
+planted: $(DEV)  ## Print what `pzd changes` makes of forces added in software to measured tests; needs the measured data
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/planted.py
+
 .PHONY: coverage-study
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identification $(BIN)/python tests/studies/coverage_study.py

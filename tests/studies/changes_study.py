@@ -34,7 +34,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
-from pzd.record import Record
+from pzd.record import Array, Record
 
 CAMPAIGNS = ("two_by_two", "constant_stroke", "sines_and_triangles")
 ELEMENT = ("T0", "C", "k")
@@ -74,9 +74,9 @@ def pair(seed: int, index: int, kind: str) -> Pair:
     motions, others = driven(run), driven(other)
     coarse = [stand.driven(run, t, actuator, default_rng([phases, i]), True) for i, t in enumerate(run.tests)]
     plain = case.HiddenDamper(base, {}, 22.0)
-    scale = case._scale(run, base, coarse, [plain.force(m, None) for m in coarse])  # noqa: SLF001  # as the case has it
+    scale = case._scale(run, base, coarse, [plain.force(m, None) for m in coarse])
     outside = tuple(str(n) for n in rng.choice(list(OUTSIDE), int(rng.integers(1, 3)), replace=False))
-    laws = case._sized_laws(outside, plain, coarse, scale, 1.0, rng)  # noqa: SLF001  # as the case has it
+    laws = case._sized_laws(outside, plain, coarse, scale, 1.0, rng)
     first = case.HiddenDamper(base, laws, 22.0)
     names = {"changed": int(rng.integers(1, 3)), "same": 0, "stand": 0}[kind]
     truth: dict[str, Mapping[str, float]] = {}
@@ -122,10 +122,13 @@ def _changed(
     return changed, values
 
 
-def _records(motions, forces, chain, peak, values, rng) -> tuple[Record, ...]:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _records(
+    motions: list[stand.Driven], forces: list[Array], chain: stand.Chain, peak: float, values: tuple[float, ...],
+    rng: Generator,
+) -> tuple[Record, ...]:  # fmt: skip
     found = []
     for i, (m, f) in enumerate(zip(motions, forces, strict=True)):
-        t = case._logged(m, f, None, chain, peak, values, rng)  # noqa: SLF001  # as the case has it
+        t = case._logged(m, f, None, chain, peak, values, rng)
         v = np.gradient(t.displacement, t.time)
         signal = None if t.signal is None else t.signal
         found.append(Record(f"r{i:02d}", None, t.time, t.displacement, v, np.gradient(v, t.time), t.force, signal))
@@ -180,6 +183,12 @@ def _short(value: object) -> str:
     return "/".join(f"{v:.4g}" for v in np.atleast_1d(np.array(value, dtype=float)))
 
 
+def say(line: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
 def main() -> int:
     """Draw, compare and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -200,14 +209,16 @@ def main() -> int:
         intervals += held_here
         names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
         truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
-        print(f"{index:4d} {'equal' if drawn.equal else 'other'} {verdict:18s} {found.verdict:11s} {truth} -> {names} "
-              f"rivals {list(found.rivals)} {100 * found.difference.share_of_peak:.2f} % held {held_here} "
-              f"outside {'+'.join(drawn.outside)} tests {len(drawn.before)} {time.monotonic() - begun:.0f} s")  # fmt: skip
-        sys.stdout.flush()
+        motions, seconds = "equal" if drawn.equal else "other", time.monotonic() - begun
+        say(
+            f"{index:4d} {motions} {verdict:18s} {found.verdict:11s} {truth} -> {names} rivals {list(found.rivals)} "
+            f"{100 * found.difference.share_of_peak:.2f} % held {held_here} outside {'+'.join(drawn.outside)} "
+            f"tests {len(drawn.before)} {seconds:.0f} s"
+        )
     for equal, count in counts.items():
         if count:
-            print(f"{'equal' if equal else 'other'} motions: {dict(count)} of {count.total()}")
-    print(f"intervals that hold: {sum(intervals)} of {len(intervals)}")
+            say(f"{'equal' if equal else 'other'} motions: {dict(count)} of {count.total()}")
+    say(f"intervals that hold: {sum(intervals)} of {len(intervals)}")
     return 0
 
 

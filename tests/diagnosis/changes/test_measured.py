@@ -1,4 +1,4 @@
-"""A measured friction damper at three tensions of its band: its friction rises with the tension, its backlash does not."""
+"""A measured friction damper at three tensions of its band: its friction rises, its backlash does not."""
 
 from __future__ import annotations
 
