@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from pzd.cli.options import Call, on_config
 from pzd.cli.output import complain, exit_code
@@ -12,6 +14,8 @@ from pzd.report.diagnosis_text import diagnosis_lines
 
 if TYPE_CHECKING:
     from pzd.runs import Run
+
+InBrowser = Annotated[bool, typer.Option("--open", help="Open the page in the browser.")]
 
 _SUMMARIES = {
     "run": "Run every stage, from rig records to the comfort report.",
@@ -21,7 +25,6 @@ _SUMMARIES = {
     "diagnose": "Find what the model misses, and print the verdict.",
     "table": "Tabulate force over voltage and speed.",
     "simulate": "Compute the rides of the half-car on the damper.",
-    "report": "Rate the rides by comfort, and write the page.",
 }
 
 
@@ -40,7 +43,7 @@ def _diagnosis(run: Run, *, verbose: bool) -> list[str]:
     return diagnosis_lines(found.diagnosis, run.control, every_test=verbose, hypotheses=found.hypotheses)
 
 
-_AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _diagnosis}
+_AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "diagnose": _diagnosis}
 """What a command prints once its stages are up to date."""
 
 
@@ -89,4 +92,21 @@ def _run(call: Call) -> None:
     exit_code(marks)
 
 
-COMMANDS = (*(_command(name, summary) for name, summary in _SUMMARIES.items()), watch)
+@on_config("force", "jobs")
+def report(call: Call, in_browser: InBrowser = False) -> int:
+    """Rate the rides by comfort, and write the page."""
+    marks = call.execute("report", force=call.force)
+    call.output.say(*_page(call.opened.run))
+    if in_browser:
+        import webbrowser
+
+        from pzd.pipeline.run_summary import page_of
+        from pzd.schema.errors import FilesError
+
+        page = page_of(call.opened.run)
+        if not webbrowser.open(page.resolve().as_uri()):
+            raise FilesError(f"{page}: no browser was found to open it; open the file by hand")
+    return exit_code(marks)
+
+
+COMMANDS = (*(_command(name, summary) for name, summary in _SUMMARIES.items()), report, watch)

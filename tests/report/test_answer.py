@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.report.blocks import amount
+from pzd.report.config import ReportConfig
 from pzd.report.page import answer
 from pzd.report.plots.answer import best_policy, closing, missed_loop
 
@@ -50,6 +51,13 @@ def test_every_verdict_has_its_sentence(run: Any, context_of: Any, changes: dict
     told = answer(context_of(run.with_diagnosis(**changes)))
     assert told.startswith(said)
     assert told.endswith(".")
+
+
+def test_what_the_user_says_of_the_damper_stands_in_the_head(run: Any) -> None:
+    page = run.told(ReportConfig(about={"serial number": 117, "operator": "N. <N>"})).page
+    head = page.partition('class="answer-line"')[0]
+    assert "<dt>serial number</dt><dd>117</dd>" in head
+    assert "<dt>operator</dt><dd>N. &lt;N&gt;</dd>" in head
 
 
 def test_the_difference_below_is_measured_less_model_on_a_scale_of_its_own(run: Any, context_of: Any) -> None:
