@@ -106,10 +106,11 @@ def check_residual(
 
 
 def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]:
-    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic between its samples."""
-    from scipy.interpolate import CubicSpline
+    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump."""
+    from scipy.interpolate import Akima1DInterpolator
 
-    time, course = prepared.record.time, CubicSpline(prepared.record.time, force)
+    time = prepared.record.time
+    course = Akima1DInterpolator(time, force, method="makima")
     return lambda delay: np.asarray(course(np.clip(time - delay, time[0], time[-1]))) if delay else force
 
 
