@@ -30,8 +30,20 @@ from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.runs import Run
 
 COMMANDS = [
-    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch", "peers"),
-    *("check", "show", "compare", "export", "figures", "sweep", "blind", "init", "schema", "effects"),
+    *(
+        "run",
+        "synthesise",
+        "ingest",
+        "identify",
+        "diagnose",
+        "table",
+        "simulate",
+        "report",
+        "watch",
+        "peers",
+        "changes",
+    ),
+    *("check", "show", "compare", "rate", "export", "figures", "sweep", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
 
@@ -654,7 +666,10 @@ def test_init_says_which_quantity_it_did_not_find(typed: Terminal) -> None:
     """Of the columns that hold nothing else, and have a name."""
     Path("odd.csv").write_text("a1,b1,force_N,\n1,2,3,\n")
     assert typed("init", "odd.csv") == 0
-    assert any(line.endswith("displacement:   # fill in: one of a1, b1") for line in typed.out)
+    assert any(
+        line.endswith("time:   # fill in: one of a1, b1; or say rate_Hz: N instead, where no column holds it")
+        for line in typed.out
+    )
 
 
 # ---------------------------------------------------------------- the story

@@ -112,6 +112,7 @@ def clone(
     """Type a command where `make demo` was run; a small damper takes the place of the quickstart."""
     (tmp_path / "configs").mkdir()
     (tmp_path / "configs" / "quickstart.yaml").write_text(yaml.safe_dump(SMALL, sort_keys=False), encoding="utf-8")
+    shutil.copy(ROOT / "configs" / "aged.yaml", tmp_path / "configs")
 
     def run(command: str) -> subprocess.CompletedProcess[str]:
         """Do what a shell would, which expands patterns and writes to a file."""

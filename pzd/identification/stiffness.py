@@ -44,7 +44,7 @@ def settle_stiffness(
     -------
     the fit to be used, and the stiffness from which on k lies in the 95 % interval; infinite where the tests show k
     """
-    rigid = fit_rigid(objective)
+    rigid = fit if np.isinf(fit.parameters.stiffness) else fit_rigid(objective)
     best = min(fit, rigid, key=lambda f: f.criterion)
     if _rejected(records, objective, best, rigid, nuisance):
         return fit, np.inf

@@ -30,7 +30,7 @@ from pzd.schema.validate import read_json_list
 # --- The source code that a stage may use, as one hash
 
 PACKAGE = Path(pzd.__file__).parent
-_TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t].*\n|\n)+", re.MULTILINE)
+_TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:.*\n(?:[ \t].*\n|\n)+", re.MULTILINE)
 """Imports for annotations alone, which are not executed."""
 _FROM = re.compile(r"^[ \t]*from (pzd[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 """An import of names, each of which may be a module; in brackets over several lines."""

@@ -162,7 +162,8 @@ def _parameter(run: RunNumbers, column: str, selection: Selection) -> Computed:
             "conditions", [row.words(run.control) or "the rig" for row in matches], open_columns, run.control
         )
     row, estimate = matches[0], Estimate.of(matches[0], column)
-    interval = "" if estimate.interval is None else ", 95 % {:.4g} to {:.4g}".format(*estimate.interval)
+    low, high = estimate.low95, estimate.high95
+    interval = "" if low is None else f", 95 % above {low:.4g}" if high is None else f", 95 % {low:.4g} to {high:.4g}"
     return Computed(estimate.value, f"identified at {row.words(run.control) or 'the rig'}{interval}, {row.status}")
 
 

@@ -134,5 +134,8 @@ def test_a_delay_of_the_tests_does_not_pass_for_more_or_less_play(rng: np.random
     effects = {"lash": {"delta": 1.5e-4}}
     shifts = (1.2e-3, -1.2e-3, 1.2e-3, -1.2e-3)
     late = tuple(shown_late(delay, effects, test, rng) for delay, test in zip(shifts, FOUR, strict=True))
-    delta = fitted_to(late, effects)[1].damper.effects["lash"]["delta"]
-    assert delta == pytest.approx(1.5e-4, rel=0.015)
+    found = fitted_to(late, effects)[1]
+    delta = found.damper.effects["lash"]["delta"]
+    # Delays of 2.4 standard deviations are drawn towards zero by their prior: not by more than the interval allows.
+    assert delta == pytest.approx(1.5e-4, rel=0.02)
+    assert abs(float(delta) - 1.5e-4) < LEVEL * standard_errors(found)[0]

@@ -94,7 +94,7 @@ def test_residuals_and_jacobian_are_those_of_the_whole_damper(effect: str, movin
     counted = o.residual_and_slopes(here, np.zeros((here.size, 0)))[:, 0]
     np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-5, atol=1e-5)
     for j in range(x.size):
-        slope = (force(j, 2e-4, 1e-11) - force(j, -2e-4, 1e-11)) / 4e-4
+        slope = (force(j, 2e-5, 1e-11) - force(j, -2e-5, 1e-11)) / 4e-5  # a branch slips at other samples beyond
         exact = o.residual_and_slopes(here, slope[:, None])[:, 1]
         missed = np.linalg.norm(left.jacobian.dense()[:, j] - exact)
         assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))

@@ -92,7 +92,7 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
     >>> to_canonical(np.array([1.5]), "kN", FORCE).tolist()
     [1500.0]
     >>> to_canonical(np.array([2.5, 2.5, 3.0]), "-200 N/V about the mean of the first 2", FORCE).tolist()
-    [0.0, 0.0, -100.0]
+    [-0.0, -0.0, -100.0]
     """
     if unit == quantity.unit:
         return values
