@@ -104,7 +104,7 @@
     });
   });
   const showTable = () => {
-    const places = [...by("explorer-voltages").selectedOptions].map((option) => Number(option.value));
+    const places = [...by("explorer-levels").selectedOptions].map((option) => Number(option.value));
     table.forEach((line, n) => { line.visible = places.includes(n); });
   };
   if (steady) {
@@ -122,5 +122,5 @@
   Bokeh.Plotting.show(Bokeh.Plotting.gridplot(grid, options), by("explorer-plots"));
   if (steady) Bokeh.Plotting.show(steady, by("explorer-table"));
   for (const id of ["explorer-tests", ...curves.map(([name]) => `explorer-${name}`)]) by(id).addEventListener("change", show);
-  if (steady) { by("explorer-voltages").addEventListener("change", showTable); showTable(); }
+  if (steady) { by("explorer-levels").addEventListener("change", showTable); showTable(); }
 })();
