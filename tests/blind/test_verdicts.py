@@ -68,7 +68,13 @@ def test_a_small_benchmark_names_what_is_there(pzd: Command, root: Path, tmp_pat
     assert (Rate.of(outside, unexplained).share or 0.0) >= 0.7, said.stdout
 
 
-@pytest.mark.parametrize("fault", MENDED)
+STILL = "what is left without the effect is slow, and bends the rest"
+"""Named again no longer: the effect is adopted with its size, and what is left, 0.11 % of peak, counts as unexplained."""
+
+
+@pytest.mark.parametrize(
+    "fault", [pytest.param(f, marks=pytest.mark.xfail(strict=True, reason=STILL)) if f == STILL else f for f in MENDED]
+)
 def test_what_is_hidden_is_named_and_nothing_else(
     fault: str, setup_of: Callable[[RunConfig], BenchmarkSetup], tmp_path: Path
 ) -> None:
