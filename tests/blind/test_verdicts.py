@@ -69,7 +69,7 @@ def test_a_small_benchmark_names_what_is_there(pzd: Command, root: Path, tmp_pat
 
 
 STILL = "what is left without the effect is slow, and bends the rest"
-"""Named again no longer: the effect is adopted with its size, and what is left, 0.11 % of peak, counts as unexplained."""
+"""No longer named: the effect is adopted with its size, but what is left, 0.11 % of peak, counts as unexplained."""
 
 
 @pytest.mark.parametrize(
