@@ -23,8 +23,6 @@ MOST_IN_SAMPLES = 150
 """Most samples beside jumps in a record compared sample by sample, which has as many jumps as reversals."""
 SAMPLES_PER_REVERSAL = 4
 """Samples beside the jump of a dry friction: two, and one at either end that it reaches through a filter."""
-AS_FAST = 0.25
-"""Share of the fastest step of a flank down to which its neighbours belong to it."""
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
@@ -51,33 +49,6 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     found = np.zeros(force.size)
     found[largest] = bend[largest]
     return found
-
-
-def flank(force: Array, at: int) -> tuple[int, int]:
-    """Return first and last sample of the steep flank beside a sample, over which the force rises or falls as fast.
-
-    As fast is by a quarter of its fastest step and in its direction, so that what bends at either end belongs to it.
-
-    Parameters
-    ----------
-    force : (n,) [N]
-    at : a sample beside a jump, not at an end
-
-    Examples
-    --------
-    >>> flank(np.array([0.0, 0.1, 2.0, 4.0, 6.0, 6.1, 6.2]), 1)
-    (1, 4)
-    """
-    steps = np.diff(force)
-    first = last = at if abs(steps[min(at, steps.size - 1)]) >= abs(steps[at - 1]) else at - 1
-    fastest = steps[first]
-    if fastest == 0.0:
-        return first, last + 1
-    while first > 0 and steps[first - 1] / fastest >= AS_FAST:
-        first -= 1
-    while last < steps.size - 1 and steps[last + 1] / fastest >= AS_FAST:
-        last += 1
-    return first, last + 1
 
 
 def jumps_in_samples(measured: Array, predicted: Array, reversals: int = 0) -> Array:

@@ -68,13 +68,7 @@ def test_a_small_benchmark_names_what_is_there(pzd: Command, root: Path, tmp_pat
     assert (Rate.of(outside, unexplained).share or 0.0) >= 0.7, said.stdout
 
 
-STILL = "what is left without the effect is slow, and bends the rest"
-"""No longer named: the effect is adopted with its size, but what is left, 0.11 % of peak, counts as unexplained."""
-
-
-@pytest.mark.parametrize(
-    "fault", [pytest.param(f, marks=pytest.mark.xfail(strict=True, reason=STILL)) if f == STILL else f for f in MENDED]
-)
+@pytest.mark.parametrize("fault", MENDED)
 def test_what_is_hidden_is_named_and_nothing_else(
     fault: str, setup_of: Callable[[RunConfig], BenchmarkSetup], tmp_path: Path
 ) -> None:

@@ -331,7 +331,7 @@ def test_evidence_does_not_grow_with_the_sampling_rate(rng: Generator) -> None:
     assert {(d.verdict, d.effects) for d in found.values()} == {("named", ("gas_spring",))}
     pays = {rate: d.ranking[0].delta_bic for rate, d in found.items()}
     assert pays[8000] == pytest.approx(pays[1000], rel=0.1)
-    assert pays[250] == pytest.approx(pays[1000], rel=1 / 3)  # 25 of the 80 harmonics of 4 Hz lie below 100 Hz
+    assert pays[250] == pytest.approx(pays[1000], rel=0.2)  # 25 of the 80 harmonics of 4 Hz lie below 100 Hz
 
 
 @pytest.mark.ci

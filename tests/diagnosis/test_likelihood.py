@@ -17,11 +17,10 @@ from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, jump_columns, shown_force
+from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, shown_force
 from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
 from pzd.diagnosis.search.candidates import candidate
 from pzd.record import Array, Record
-from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig
 
 
@@ -119,20 +118,6 @@ def test_evidence_is_a_band_s_and_not_a_sample_s(effect: str, rng: np.random.Gen
         found.append(-candidate(whole, before, library()[effect]).delta_bic)
     assert min(found) > 100.0
     assert min(found) > 2.0 / 3.0 * max(found)
-
-
-def test_a_resolved_flank_is_evidence_but_for_its_instant() -> None:
-    # Thirty samples of a flank: a shift by a part of a sample explains its instant, and nothing its slope.
-    force = np.clip(np.arange(100.0) - 50.0, -15.0, 15.0) * 20.0
-    columns = jump_columns(jumps(force), force)
-    slope = np.gradient(force)
-    assert np.linalg.matrix_rank(columns) == 1
-    assert np.max(np.abs(columns)) == pytest.approx(0.29 * 20.0)
-    steeper = np.clip(1.2 * (np.arange(100.0) - 50.0), -15.0, 15.0) * 20.0 - force
-    explained = columns @ np.linalg.lstsq(columns, steeper, rcond=None)[0]
-    assert np.linalg.norm(steeper - explained) > 0.9 * np.linalg.norm(steeper)
-    shifted = 0.2 * slope
-    assert columns @ np.linalg.lstsq(columns, shifted, rcond=None)[0] == pytest.approx(shifted, abs=3.0)
 
 
 def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Generator) -> None:
