@@ -261,23 +261,23 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
         if better is None:
             break
         added.append(better[0])
-        current = better[1]
-        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _name(added[-1]), current.error.criterion)
-    if not added:
-        return adoption
-    lean = _without_off(_without_replaced(current, validation, config.force), validation, config.force)
-    names = tuple(_name(each) for each in added if each.effect in lean.fitted.effects)
+        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _name(added[-1]), better[1].error.criterion)
+        # What is off beside the new effect goes at once: something else may then explain what it had stood in for.
+        current = _without_off(_without_replaced(better[1], validation, config.force), validation, config.force)
+        off = tuple(name for name in better[1].fitted.effects if name not in current.fitted.effects)
+        config = config.model_copy(update={"forbid": (*config.forbid, *off)})
+    names = tuple(_name(each) for each in added if each.effect in current.fitted.effects)
     if not names:
         return adoption
     new = {each.effect: ADDED for each in added if each.effect not in selection.adopted}
-    gone = dict.fromkeys({*selection.adopted, *new} - {*lean.fitted.effects}, REPLACED)
+    gone = dict.fromkeys({*selection.adopted, *new} - {*current.fitted.effects}, REPLACED)
     extended = replace(
         selection,
-        fitted=lean.fitted,
-        final_evidence=replace(selection.final_evidence, whole=lean.problem),
+        fitted=current.fitted,
+        final_evidence=replace(selection.final_evidence, whole=current.problem),
         reasons={**selection.reasons, **new, **gone},
     )
-    errors = adoption.baseline_error, lean.error, lean.interpolation_error
+    errors = adoption.baseline_error, current.error, current.interpolation_error
     return Adoption(extended, *errors, by_criterion=True, added=names)
 
 
