@@ -334,8 +334,8 @@ def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     """Return the baseline of one setting: the damper with its identified parameters and no effect.
 
     A value that the data do not determine is taken from the nearest condition that has it (by voltage, then
-    temperature), within its own interval where it has one; where no condition has it, it is the middle of that
-    interval, else from `FALLBACK`.
+    temperature), within its own interval where it has one; where no condition has it, it is the lower end of that
+    interval, which for C is mostly no damping at all, else from `FALLBACK`.
 
     Raises
     ------
@@ -375,7 +375,7 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
         if (mine := getattr(row, name)) is not None:
             return float(mine)
         low, high = getattr(row, f"{name}_low95"), getattr(row, f"{name}_high95")
-        found = min(known)[1] if known else FALLBACK[name] if high is None else 0.5 * ((low or 0.0) + high)
+        found = min(known)[1] if known else FALLBACK[name] if high is None else low or 0.0
         return max(min(found, math.inf if high is None else high), low or 0.0)
 
     return BaseRow(

@@ -254,6 +254,8 @@ class Damper(Result):
             f"{symbol} {_span([getattr(row, name) for row in rows])} {unit}"
             for symbol, name, unit in (("T0", "T0_N", "N"), ("C", "C_Ns_per_m", "N s/m"), ("k", "k_N_per_m", "N/m"))
         ]
+        if all(np.isinf(row.k_N_per_m) for row in rows):
+            spans[-1] = "k infinite (no oil spring)"
         return [f"{head}: {', '.join(spans)}", *effects]
 
     @override
