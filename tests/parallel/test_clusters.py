@@ -118,7 +118,7 @@ def test_a_cluster_under_tls_gives_the_same_bytes_and_takes_no_stranger(
     )
     security = engines.security(Where(secured, "sweep", certificates, tmp_path))
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, security=security
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", security=security
     ) as cluster:
         assert cluster.scheduler_address.startswith("tls://")
         given = [f"sweep.address={cluster.scheduler_address}", "sweep.engine=dask"]

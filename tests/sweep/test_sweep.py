@@ -329,7 +329,7 @@ def test_dask_gives_the_same_bytes_though_a_worker_is_killed(small: Path, tmp_pa
     alone, _ = swept(small, tmp_path / "a", "sweep.chunk=1", jobs=2)
     killed: list[int] = []
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     ) as cluster:
 
         def kill_one(_: Progress) -> None:
