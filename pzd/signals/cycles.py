@@ -164,9 +164,26 @@ def settled_cycles(run: Cycles, time: Array, force: Array) -> Cycles:
     the same run where its force repeats throughout, or where fewer than two cycles would remain
     """
     span = _repeating_span(time, force, run.period, (run.start, run.end), SAME_FORCE)
-    if span == (run.start, run.end) or span[1] - span[0] < FEWEST_CYCLES * run.period:
-        return run
-    return _whole_cycles(time, PeriodicSection(run.period, *span), run.period)
+    if span != (run.start, run.end) and span[1] - span[0] >= FEWEST_CYCLES * run.period:
+        run = _whole_cycles(time, PeriodicSection(run.period, *span), run.period)
+    if run.count > 2 and _begins_with_transient(run.fold(time, force)):
+        # A transient of a few samples, which the running median of `_repeating_span` takes for a spike.
+        return Cycles(run.period, run.start + run.period, run.count - 1)
+    return run
+
+
+def _begins_with_transient(folded: Array) -> bool:
+    """Decide whether the first points of the first of three cycles (count, points) or more differ from the others'.
+
+    Where the recorder starts in full motion and the oil spring is loaded within milliseconds.
+    """
+    later = folded[1:] - drift_over_cycles(folded)[1:]
+    head = max(folded.shape[1] // TRANSIENT_PART, 2)
+    first = np.abs(folded[0] - drift_over_cycles(folded)[0] - later.mean(axis=0))
+    scatter = np.abs(later - later.mean(axis=0)).max(axis=0)
+    beside = np.max([np.roll(scatter, shift) for shift in range(-2, 3)], axis=0)
+    least = max(NOISE_DEVIATIONS * float(np.median(first)) / MEDIAN_OF_NORMAL, SAME_FORCE * float(np.ptp(later)))
+    return bool(np.any(first[:head] > np.maximum(LIKE_OTHERS * beside[:head], least)))
 
 
 def _smoothed(run: Cycles, time: Array, displacement: Array) -> tuple[Array, int]:
@@ -297,6 +314,12 @@ SAME_FORCE = 2e-3
 """Difference of the force that always counts as repeating, as a share of its range."""
 EDGE_ROUNDS = 4
 """Most cycles cut off at either end."""
+TRANSIENT_PART = 10
+"""Part of a cycle at its beginning in which a transient is looked for: the running median hides less than 1/20."""
+NOISE_DEVIATIONS = 5.0
+"""Standard deviations of the noise that a transient exceeds: one of a hundred samples does so once in 10^4 records."""
+MEDIAN_OF_NORMAL = 0.6745
+"""Median of the magnitude of normal noise, as a share of its standard deviation."""
 
 
 def decimated_means(time: Array, values: Array, period: float, points: int) -> tuple[Array, Array]:

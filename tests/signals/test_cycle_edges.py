@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.element import element_force
-from pzd.signals.cycles import cycles, decimated_means, settled_cycles
+from pzd.signals.cycles import Cycles, cycles, decimated_means, settled_cycles
 
 SIGMAS = 4.0
 NOT_SEEN = 0.002
@@ -132,6 +132,32 @@ def test_the_cycle_in_which_the_oil_spring_is_loaded_is_left_out(rng: np.random.
             departs = np.abs(folded[0] - folded[1]) > 0.02 * np.ptp(force)
             assert np.mean(departs) < 1.0 / 30.0
     assert left_out > 0
+
+
+def kept_force(run: Cycles, time: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Force of the same element in the motion of the record, which began a cycle earlier."""
+    step = float(time[1] - time[0])
+    before = np.arange(-run.period, 0.0, step)
+    earlier = 0.015 * np.sin(2.0 * np.pi * before / run.period)
+    return element_force(np.concatenate([earlier, motion]), step, 180.0, 900.0, 4.0e5)[before.size :]
+
+
+@pytest.mark.parametrize("frequency_hz", [0.5, 1.5, 5.0, 12.0])
+@pytest.mark.parametrize("rate_hz", [200.0, 500.0, 2000.0])
+def test_a_recorder_that_starts_in_full_motion_costs_the_first_cycle(
+    rng: np.random.Generator, frequency_hz: float, rate_hz: float
+) -> None:
+    # T0/k = 0.45 mm at full speed is passed within some milliseconds: one to thirty samples of a thousand
+    time = np.arange(0.0, 6.0 / frequency_hz, 1.0 / rate_hz)
+    motion = 0.015 * np.sin(2.0 * np.pi * frequency_hz * time)
+    force = noisy(element_force(motion, 1.0 / rate_hz, 180.0, 900.0, 4.0e5), rng)
+    run = cycles(time, motion)
+    assert run is not None
+    assert run.start < 0.5 / frequency_hz
+    kept = settled_cycles(run, time, force)
+    assert kept.count == run.count - 1
+    loaded = np.abs(element_force(motion, 1.0 / rate_hz, 180.0, 900.0, 4.0e5) - kept_force(kept, time, motion))
+    assert np.max(loaded[kept.inside(time)]) < 0.01 * np.ptp(force)
 
 
 def test_force_that_repeats_from_the_first_cycle_on_loses_none(rng: np.random.Generator) -> None:
