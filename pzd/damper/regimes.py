@@ -213,7 +213,7 @@ def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> fl
 # which takes the slope of the flow curve exactly however fast the force settles (large k/C, slow test): in the elastic
 # deflection e where the flow curve is inverted in closed form, else in the viscous force s = visc(w), in which w(s) and
 # F(s) are both explicit and dF/ds >= 1, so that nothing is inverted. Where the fluid thins and the yield is rounded, e
-# again: dF/ds has a cusp at s = 0, where it falls from T0/(C w_s) to 1, and a slope taken there hides the rest of a piece.
+# again: dF/ds has a cusp at s = 0, falling from T0/(C w_s) to 1, and a slope taken there hides the rest of a piece.
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SECOND_DIFFERENCE = 0.03  # of a step, for the change of that drift: a shorter one would show rounding
