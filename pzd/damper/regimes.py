@@ -212,7 +212,8 @@ def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> fl
 # Straight pieces with constant parameters are solved in closed form. The others are integrated by the method above,
 # which takes the slope of the flow curve exactly however fast the force settles (large k/C, slow test): in the elastic
 # deflection e where the flow curve is inverted in closed form, else in the viscous force s = visc(w), in which w(s) and
-# F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
+# F(s) are both explicit and dF/ds >= 1, so that nothing is inverted. Where the fluid thins and the yield is rounded, e
+# again: dF/ds has a cusp at s = 0, falling from T0/(C w_s) to 1, and a slope taken there hides the rest of a piece.
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SECOND_DIFFERENCE = 0.03  # of a step, for the change of that drift: a shorter one would show rounding
@@ -257,7 +258,7 @@ def piece(
         pull, pull_after = side * extension_speed(step, at), side * extension_speed(step, at + dt)
         end = slip(force, force - slope * w, pull, pull_after, relaxation(dt, slope, p[K]))
         return deflection_on(end, p, side), w + (end - force) / slope, 0.0
-    if flow.speed_explicit(p):
+    if flow.speed_explicit(p) or not (kernels.viscous_straight(p) or kernels.yield_sharp(p)):
         end, error = _exponential(e, w, at, dt, regime, side, step, True)
         p = row_in(step, at + dt)
         force = side * p[K] * kernels.stroke_law(end, side, p)

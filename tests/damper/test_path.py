@@ -45,6 +45,7 @@ FLOWS = [
         "frame_compliance": {"d_f": 1e-3, "s_f": 1e-3},
         "relief_valve": {"F_r": 900.0, "C_r": 400.0},
     },
+    {"rounded_yield": {"w_s": 0.005}, "shear_thinning": {"n": 0.9}},
 ]
 
 
@@ -209,7 +210,7 @@ def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -
     np.testing.assert_allclose(fine[::8], whole, rtol=0, atol=1e-9 * np.max(np.abs(whole)))
 
 
-@pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7], FLOWS[8]], ids="+".join)
+@pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7], FLOWS[8], FLOWS[-1]], ids="+".join)
 def test_a_force_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict) -> None:
     """C/k is a twentieth of the step and less, as in a slow test of a stiff damper; cut in 64, no piece is stiff."""
     hard = with_effects(effects)
@@ -262,12 +263,36 @@ def test_behind_an_open_relief_valve_moving_parameters_cost_no_order() -> None:
     assert np.log(coarse / fine) / np.log(4.0) > 4.5
 
 
-@pytest.mark.parametrize("effects", FLOWS[:4], ids="+".join)
+@pytest.mark.parametrize("effects", [*FLOWS[:4], FLOWS[-1]], ids="+".join)
 def test_at_the_tolerance_of_the_diagnosis_the_force_is_right_to_1e_6_of_peak(effects: dict) -> None:
     motion, damper = sine(40.0), with_effects(effects)
     truth = respond(damper, motion, tolerance=1e-12)
     ours = respond(damper, motion, tolerance=SIMULATION_TOLERANCE)
     assert np.max(np.abs(ours - truth)) <= 1e-6 * np.max(np.abs(truth))
+
+
+def test_whatever_flow_effects_meet_the_force_is_right_at_the_tolerance_of_the_diagnosis(
+    rng: np.random.Generator,
+) -> None:
+    """A yield that rounds within millimetres a second, a fluid that hardly thins: the flow curve has a cusp there."""
+    for _ in range(40):
+        friction, damping = rng.uniform(50.0, 400.0), rng.uniform(300.0, 4000.0)
+        stiffness, w_s, thinned = np.exp(rng.uniform(np.log([5e4, 5e-4, 0.01]), np.log([2e6, 0.1, 0.6])))
+        laws = {
+            "rounded_yield": {"w_s": w_s},
+            "shear_thinning": {"n": 1.0 - thinned},
+            "orifice_quadratic": {"q": rng.uniform(300.0, 8000.0)},
+            "asymmetry": {"alpha": rng.uniform(-0.4, 0.4)},
+            "relief_valve": {"F_r": rng.uniform(1.1, 3.0) * friction, "C_r": 0.3 * damping},
+            "lash": {"delta": rng.uniform(1e-5, 1e-3)},
+        }
+        meeting = {name: laws[name] for name in rng.choice(list(laws), rng.integers(2, 5), replace=False)}
+        base = (BaseRow(T0_N=friction, C_Ns_per_m=damping, k_N_per_m=stiffness),)
+        damper = Damper(base=base, effects=meeting)
+        motion = sine(0.0, float(np.exp(rng.uniform(np.log(0.3), np.log(5.0)))), rng.uniform(0.005, 0.03))
+        truth = respond(damper, motion, tolerance=1e-11)
+        ours = respond(damper, motion, tolerance=SIMULATION_TOLERANCE)
+        assert np.max(np.abs(ours - truth)) <= 2e-6 * np.max(np.abs(truth)), damper
 
 
 @pytest.mark.parametrize("friction", [0.0, *(10.0 ** np.arange(-14.0, 1.0, 0.25))])

@@ -114,27 +114,39 @@ class Likelihood:
             found.append(U @ np.clip(mean, -NUISANCE_LIMIT, NUISANCE_LIMIT))
         return found
 
-    def deviance(self, residuals: Sequence[Array], scatter: Scatter) -> float:
-        """Return -2 ln L of (2 H + 1,) residuals, up to a constant, with the prior on how tests differ."""
-        total = (np.log(scatter.tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
-        for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
-            D = self.diagonal(i, scatter)
-            U = np.column_stack([scatter.tests * A, self.comparisons[i].jumps])
-            weighed = U / D[:, None]
-            inner = np.eye(U.shape[1]) + U.T @ weighed
-            pull = weighed.T @ r
-            total += float(r @ (r / D)) - float(pull @ np.linalg.solve(inner, pull))
-            total += float(np.sum(np.log(D))) + float(np.linalg.slogdet(inner)[1])
-        return float(total)
+    @cached_property
+    def _products(self) -> tuple[Array, ...]:
+        """(2 H + 1, m, m) products of what each test may have of its own, offset, gain, delay and jumps [N^2]."""
+        shared = (np.hstack([A, c.jumps]) for A, c in zip(self.columns, self.comparisons, strict=True))
+        return tuple(U[:, :, None] * U[:, None, :] for U in shared)
+
+    def deviances(self, residuals: Sequence[Array], scatters: Sequence[Scatter]) -> Array:
+        """Return (s,) -2 ln L of (2 H + 1,) residuals, up to a constant, with the prior on how tests differ.
+
+        Equation: r' V^-1 r = r' D^-1 r - b' M^-1 b, ln det V = ln det D + ln det M, M = I + U' D^-1 U, b = U' D^-1 r
+                                                    Source: Woodbury's identity; the determinant lemma
+        """
+        tests = np.array([each.tests for each in scatters])
+        total = (np.log(tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
+        for i, (r, A, products) in enumerate(zip(residuals, self.columns, self._products, strict=True)):
+            U = np.hstack([A, self.comparisons[i].jumps])
+            D = np.stack([self.diagonal(i, scatter) for scatter in scatters])
+            size = np.ones((tests.size, U.shape[1]))
+            size[:, : A.shape[1]] = tests[:, None]
+            inner = np.tensordot(1.0 / D, products, 1) * size[:, :, None] * size[:, None, :] + np.eye(U.shape[1])
+            pull = (r / D) @ U * size
+            total += np.sum(r**2 / D + np.log(D), axis=1) + np.linalg.slogdet(inner)[1]
+            total -= np.sum(pull * np.linalg.solve(inner, pull[:, :, None])[:, :, 0], axis=1)
+        return np.asarray(total)
 
     def best_scatter(self, residuals: Sequence[Array]) -> tuple[Scatter, float]:
         """Return the likeliest scatter of some residuals on a grid, and -2 ln L there."""
         best, least = Scatter(USUAL_SHARE, 0.0), np.inf
         for _ in range(2):  # one after the other: they are all but independent
             for tried in ([Scatter(best.tests, g) for g in DISCREPANCIES], [replace(best, tests=u) for u in SHARES]):
-                found = [self.deviance(residuals, each) for each in tried]
-                if min(found) < least:
-                    least = min(found)
+                found = self.deviances(residuals, tried)
+                if np.min(found) < least:
+                    least = float(np.min(found))
                     best = tried[int(np.argmin(found))]
         return best, least
 
