@@ -168,13 +168,27 @@ def _fill_branches(x: Array, v: Array, time: Array, rows: Array, state: Array, f
         now = rows[min(i, last)]
         travel, h = x[i] - x[i - 1], time[i] - time[i - 1]
         half = 0.5 * (v[i] - v[i - 1])
-        u0, u1 = travel / h - half, travel / h + half
-        if u0 * u1 < 0.0:
-            way = 0.5 * u0 * u0 / (u0 - u1) * h
-            kernels.branches_follow(way, state, now)
-            travel -= way
-        kernels.branches_follow(travel, state, now)
+        advance_branches(travel, travel / h - half, travel / h + half, h, state, now)
         force[i] = kernels.branch_force(0.0, state, now)
+
+
+@compiled
+def advance_branches(travel: float, u0: float, u1: float, h: float, state: Array, row: Array) -> None:
+    """Advance the deflections of the branches [m] over one step, cut where the rod reverses.
+
+    Parameters
+    ----------
+    travel : of the rod [m]
+    u0, u1 : extension speed at the start and at the end [m/s]
+    h : length of the step [s]
+    state : (b,) deflections [m], changed in place
+    row : (m,) row of the parallel forces at the end of the step
+    """
+    if u0 * u1 < 0.0:
+        way = 0.5 * u0 * u0 / (u0 - u1) * h
+        kernels.branches_follow(way, state, row)
+        travel -= way
+    kernels.branches_follow(travel, state, row)
 
 
 def constant_value(channel: Array | None) -> Array | None:

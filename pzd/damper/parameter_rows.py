@@ -33,7 +33,7 @@ from pzd.record import Array
 
 _SAME_VOLTAGE = 0.02
 """Voltages that differ by less than this share of the largest are one: labels at two temperatures differ a little."""
-_FACTORS = {"friction_factor": T0, "damping_factor": C, "stiffness_factor": K}
+MATERIAL_FACTORS = {"friction_factor": T0, "damping_factor": C, "stiffness_factor": K}
 """Laws of the material by the column of T0, C and k that they multiply."""
 
 # --- T0, C and k over voltage and temperature ---
@@ -174,7 +174,7 @@ def material_factors(
         for name, law in functions(effect, module_of(effect)).items():
             factor = np.atleast_1d(law(**{argument: given[argument] for argument in arguments(law)}))
             factors = np.repeat(factors, max(factor.size // len(factors), 1), axis=0)
-            factors[:, _FACTORS[name]] *= factor
+            factors[:, MATERIAL_FACTORS[name]] *= factor
     return factors
 
 

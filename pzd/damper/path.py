@@ -127,9 +127,17 @@ LEAST_DAMPING = 1e-2
 def _off_the_limits(rows: Array) -> Array:
     """Return (n, r) rows in which a rigid damper is hardly elastic, and one without damping hardly damps."""
     moved = rows.copy()
-    moved[:, C] = np.maximum(rows[:, C], LEAST_DAMPING * np.maximum(rows[:, T0], 1.0))
-    moved[:, K] = np.minimum(rows[:, K], (moved[:, T0] + moved[:, C]) / RIGID)
+    moved[:, C], moved[:, K] = off_the_limits(rows[:, T0], rows[:, C], rows[:, K])
     return moved
+
+
+Numbers = Array | float
+
+
+def off_the_limits(friction: Numbers, damping: Numbers, stiffness: Numbers) -> tuple[Numbers, Numbers]:
+    """Return C [N s/m] and k [N/m] of a path, from T0 [N], C and k, one or more of each."""
+    damps = np.maximum(damping, LEAST_DAMPING * np.maximum(friction, 1.0))
+    return damps, np.minimum(stiffness, (friction + damps) / RIGID)
 
 
 def deflections(force: Array, rows: Array) -> Array:

@@ -1,13 +1,15 @@
-"""The damper with its dynamics as constants in C: parameters over temperature and control signal, linear between.
+"""The damper with its dynamics in C: the laws and the march that pzd computes with, and its parameters as constants.
 
-`sources/element.c` carries the damper from these constants; what it carries exactly is listed in `CARRIED`.
+`sources/element.c` puts both together. Nothing is said a second time: `laws` translates the compiled functions of
+`pzd.damper`, so that an effect added there, or one of a user's own, is exported too.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from uuid import UUID
@@ -15,11 +17,17 @@ from uuid import UUID
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pzd.damper.compiled.columns import NEUTRAL, acting, columns_of, value_of
-from pzd.damper.effect import ELEMENT
+from pzd.damper import compose, path, regimes
+from pzd.damper.compiled import kernels
+from pzd.damper.compiled.columns import PARALLEL, STROKE_AND_FLOW, acting, columns_of
+from pzd.damper.compiled.kernels import T0, C, K
+from pzd.damper.compose import BRANCHES, TOLERANCE
+from pzd.damper.confounders import module_of
+from pzd.damper.effect import ELEMENT, arguments, functions
 from pzd.damper.model import Damper
-from pzd.damper.parameter_rows import bingham_parameters, nodes_of
+from pzd.damper.parameter_rows import MATERIAL_FACTORS, drive_row_of, element_rows, nodes_of
 from pzd.export.content import Content
+from pzd.export.translation import Translation, UntranslatableError, number
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 
@@ -45,9 +53,9 @@ def single(value: float) -> str:
     return f"{_pointed(f'{float(np.float32(value)):.9g}')}f"
 
 
-def double(value: float) -> str:
-    """Write a constant of double precision."""
-    return repr(float(value)).replace("inf", "INFINITY")
+def real(value: float) -> str:
+    """Write a constant of the precision that `sources/real.h` chooses."""
+    return "R_INFINITY" if math.isinf(value) else f"R({float(value)!r})"
 
 
 def array(kind: str, name: str, values: ArrayLike, written: Callable[[float], str]) -> str:
@@ -76,91 +84,134 @@ def _pointed(text: str) -> str:
     return text if any(mark in text for mark in ".en") else f"{text}.0"
 
 
+# --- The laws, in C ---
+
+SHARED: tuple[Callable[..., object], ...] = (
+    *(path.advance, path.off_the_limits, regimes.deflection_at, regimes.spring_force, compose.advance_branches),
+    *(kernels.follow_voltage, kernels.parallel_force, kernels.branches_follow, kernels.branch_force),
+)
+"""Functions of pzd that `sources/element.c` calls; what these call is translated with them."""
+
+
+@cache
+def laws() -> tuple[str, str]:
+    """Write `laws.h` and `laws.c`: every law of the damper and the march along its path, as pzd computes them.
+
+    Raises
+    ------
+    ConfigError : when a law uses what C has no counterpart for
+    """
+    written = Translation(ROW, kernels, frozenset([path.Sensitivities]))
+    try:
+        for function in SHARED:
+            written.add(function)
+        material = _material(written)
+    except UntranslatableError as error:
+        raise ConfigError(f"{error}; write the law in numbers, `math` and `if` alone") from error
+    sizes = {"ROW": ROW, "STATES": path.STATES, "DRIVES": max(len(acting("drive")), 1), "BRANCHES": max(BRANCHES, 1)}
+    head = "".join(
+        (
+            "/* The laws of the damper and the path through them, translated from those that pzd computes with. */\n",
+            '#ifndef LAWS_H\n#define LAWS_H\n\n#include "real.h"\n\n',
+            *(f"#define {name} {size}\n" for name, size in sizes.items()),
+            f"#define TOLERANCE {number(TOLERANCE)} /* admissible error of a piece, as a share of the force */\n\n",
+            "typedef struct { real at[ROW]; } row;\n",
+            written.types(),
+            "\nreal least(real one, real other);\nreal most(real one, real other);\n",
+            written.prototypes(shared=True),
+            f"{material.partition(chr(10))[0]};\n\n#endif\n",
+        )
+    )
+    body = f'#include "laws.h"\n\n{_EXTREMES}\n{written.prototypes(shared=False)}\n{written.definitions()}\n{material}'
+    return head, body
+
+
+_EXTREMES = """real least(real one, real other)
+{
+    return other < one ? other : one;
+}
+
+real most(real one, real other)
+{
+    return other > one ? other : one;
+}
+"""
+
+
+def _material(written: Translation) -> str:
+    """Write the row of the element at a temperature: the factors on T0, C and k, and none of them at its limit."""
+    lines = []
+    for effect in acting("material"):
+        for name, law in functions(effect, module_of(effect)).items():
+            own = {p.name: f"own[{MATERIAL.index((effect.name, p.name))}]" for p in effect.parameters}
+            given = ", ".join(
+                {**own, "temperature": "temperature", "reference": "reference"}[a] for a in arguments(law)
+            )
+            lines.append(f"p.at[{MATERIAL_FACTORS[name]}] *= {written.add(law)}({given});")
+    limits = f"const real_real moved = {written.add(path.off_the_limits)}(p.at[{T0}], p.at[{C}], p.at[{K}]);"
+    lines += [limits, f"p.at[{C}] = moved.at0;", f"p.at[{K}] = moved.at1;", "return p;"]
+    body = "".join(f"    {line}\n" for line in lines)
+    return f"row material(row p, const real *own, real temperature, real reference)\n{{\n{body}}}\n"
+
+
 # --- The damper as constants ---
 
-CARRIED = (
-    *("accumulator", "asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic"),
-    *("piezo_hysteresis", "preload_offset", "relief_valve", "knee", "second_branch", "stribeck_friction"),
-    "temperature_drift",
-)
-"""Effects whose path under held inputs is a closed form, piece by piece; `sources/element.c` holds them."""
+ROW = len(ELEMENT) + len(STROKE_AND_FLOW)
+"""Numbers in a row of the element."""
+MATERIAL = tuple((effect.name, p.name) for effect in acting("material") for p in effect.parameters)
+"""Columns of the material, which act at the temperature of each step."""
 VARIABLES = (
     *("displacement", "velocity", "signal", "temperature", "force", "initial_force", "zero", "time", "acceleration"),
 )
 """Variables of `sources/model.c`, in the order of the value references of an FMU."""
 OF_THE_RIG = tuple(effect.name for effect in acting("sensor"))
 """Effects of the channels of a rig, which the damper itself does not have."""
-PLAY = ("piezo_hysteresis", "r")
-"""Effect and parameter of the play of the drive, which acts on the control signal and is no column."""
-COLUMNS = tuple(
-    (effect, parameter) for effect, parameter in NEUTRAL if effect in CARRIED and (effect, parameter) != PLAY
-)
-"""Effect and parameter of each column of a row behind T0, C and k."""
 
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """A damper that `sources/element.c` can carry exactly."""
+    """A damper as `sources/element.c` takes it."""
 
     temperatures: Array
     """(t,) rising [degC]; a single 0 where the damper has no axis of temperature."""
     signals: Array
     """(m,) rising, the effective control signal; a single 0 where there is none."""
     rows: Array
-    """(t, m, columns) T0, C and k without drift, then `COLUMNS`; linear between, held beyond."""
-    play: float
-    """Half-width of the play of the drive, in units of the control signal."""
+    """(t, m, columns) T0, C and k without drift, then stroke and flow, parallel and material; linear between, held
+    beyond."""
+    drive: Array
+    """(d,) row of the drive."""
     reference: float
     """T_ref of the drift, the lowest temperature without one [degC]."""
     depends_on_temperature: bool
     depends_on_acceleration: bool
 
     @classmethod
-    def of(cls, damper: Damper, name: str) -> Dynamics:
-        """Lay out a damper.
-
-        Parameters
-        ----------
-        damper : with its effects
-        name : of the format
-
-        Raises
-        ------
-        ConfigError : when it has an effect that is not carried exactly, or is rigid or without damping
-        """
-        others = [effect for effect in damper.effects if effect not in (*CARRIED, *OF_THE_RIG)]
-        if others:
-            raise ConfigError(
-                f"--to {name}: {', '.join(others)} of the damper has no closed form under held inputs and cannot be "
-                "carried exactly; a table, as --to mat writes, holds its steady force"
-            )
-        if any(math.isinf(row.k_N_per_m) or row.C_Ns_per_m == 0.0 for row in damper.base):
-            raise ConfigError(
-                f"--to {name}: follows the load of the oil spring, which takes a number for k and a C above 0: write "
-                "them into k_N_per_m and C_Ns_per_m of 3-diagnose/damper.yaml (got a rigid damper, or one without "
-                "damping)"
-            )
+    def of(cls, damper: Damper) -> Dynamics:
+        """Lay out a damper with its effects."""
         drifts = [effect.name for effect in acting("material") if effect.name in damper.effects]
-        still = damper.model_copy(update={"effects": {k: v for k, v in damper.effects.items() if k not in drifts}})
+        still = damper.without_effects(*drifts)
         known = sorted({row.temperature_degC for row in damper.base if row.temperature_degC is not None})
         at_temperatures: list[float | None] = [*known] or [None]
         temperatures, reference = np.array(known or [0.0]), damper.reference_temperature_degC
         signals = nodes_of(damper, at_temperatures[0]).voltages
         # drift is left out of the rows: element.c applies it at the temperature of each step
-        extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
-        bases = [
-            np.broadcast_to(bingham_parameters(still, signals, T), (signals.size, len(ELEMENT)))
-            for T in at_temperatures
-        ]
+        rows = [element_rows(still, signals, T) for T in at_temperatures]
+        beside = [columns_of(damper, columns, signals) for columns in (PARALLEL, MATERIAL)]
         return cls(
             temperatures,
             signals,
-            np.stack([np.hstack([base, extra]) for base in bases]),
-            value_of(damper, *PLAY),
+            np.stack([_beside(signals.size, row, *beside) for row in rows]),
+            drive_row_of(damper),
             float(temperatures[0]) if reference is None else reference,
             len(known) > 1 or bool(drifts),
             "fluid_inertia" in damper.effects,
         )
+
+
+def _beside(count: int, *parts: Array) -> Array:
+    """Put rows side by side, each as often as there are nodes."""
+    return np.hstack([np.broadcast_to(part, (count, part.shape[1])) for part in parts])
 
 
 def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
@@ -177,20 +228,47 @@ def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
     content : the damper
     dynamics : the same, laid out
     """
-    columns = [*ELEMENT, *(f"{effect}_{parameter}" for effect, parameter in COLUMNS)]
-    numbers = {"PLAY": dynamics.play, "REFERENCE_TEMPERATURE": dynamics.reference, **start_values(content, dynamics)}
+    numbers = {"REFERENCE_TEMPERATURE": dynamics.reference, **start_values(content, dynamics)}
     sizes = {"TEMPERATURE_NODES": dynamics.temperatures.size, "SIGNAL_NODES": dynamics.signals.size}
+    sizes |= {"PARALLEL": len(PARALLEL), "COLUMNS": dynamics.rows.shape[2]}
     body = "".join(
         (
             f"enum {{ {', '.join(VARIABLES).upper()}, VARIABLES }};\n",
-            f"enum {{ {', '.join(columns).upper()}, COLUMNS }};\n",
             *(f"#define {name} {size}\n" for name, size in sizes.items()),
-            *(f"#define {name} {double(number)}\n" for name, number in numbers.items()),
-            array("double", "TEMPERATURES", dynamics.temperatures, double),
-            array("double", "SIGNALS", dynamics.signals, double),
-            array("double", "ROWS", dynamics.rows, double),
+            *(f"#define {name} {real(value)}\n" for name, value in numbers.items()),
+            f"#define DRIVE {{{', '.join(map(real, dynamics.drive))}}}\n",
+            "/* Each row: T0 [N], C [N s/m], k [N/m], then by effect and parameter:\n",
+            *(f" * {' '.join(line)}\n" for line in _lines([*STROKE_AND_FLOW, *PARALLEL, *MATERIAL])),
+            " */\n",
+            array("real", "TEMPERATURES", dynamics.temperatures, real),
+            array("real", "SIGNALS", dynamics.signals, real),
+            array("real", "ROWS", dynamics.rows, real),
         )
     )
-    token = str(UUID(bytes=sha256(f"{content.origin}\n{content.name}\n{body}".encode()).digest()[:16]))
-    guard = "#ifndef ELEMENT_DATA_H\n#define ELEMENT_DATA_H\n#include <math.h>\n"
+    token = str(UUID(bytes=sha256(f"{content.origin}\n{content.name}\n{body}{laws()}".encode()).digest()[:16]))
+    guard = '#ifndef ELEMENT_DATA_H\n#define ELEMENT_DATA_H\n#include "real.h"\n'
     return f'{head(content)}{guard}#define TOKEN "{token}"\n{body}#endif\n', token
+
+
+def _lines(columns: Sequence[tuple[str, str]]) -> Iterator[list[str]]:
+    """Yield the names of columns, so many a line."""
+    names = [f"{effect}.{parameter}" for effect, parameter in columns]
+    yield from (names[i : i + _WIDTH // 2] for i in range(0, len(names), _WIDTH // 2))
+
+
+ELEMENT_SOURCES = ("element.c", "laws.c")
+"""What is compiled for the damper with its dynamics."""
+
+
+def element_files(content: Content, dynamics: Dynamics) -> tuple[dict[str, bytes], str]:
+    """Return the sources of the damper with its dynamics by name, and its token.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    """
+    data, token = data_of(content, dynamics)
+    declarations, definitions = ((head(content) + text).encode() for text in laws())
+    found = {name: source(content, name) for name in ("element.h", "element.c", "real.h")}
+    return found | {"laws.h": declarations, "laws.c": definitions, "element_data.h": data.encode()}, token

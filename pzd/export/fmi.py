@@ -108,7 +108,7 @@ def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str
     output = next(place for place, one in enumerate(found, 1) if one.causality == "output")
     states = ("canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions")
     cosimulation = (
-        _open("CoSimulation", _abilities(*states)),
+        _open("CoSimulation", _abilities(*states, "canInterpolateInputs")),
         "<SourceFiles>",
         *(_alone("File", {"name": name}) for name in sources),
         "</SourceFiles></CoSimulation>",

@@ -1,7 +1,7 @@
 """FMI 2.0 and 3.0 co-simulation: the damper with its dynamics in plain C, with its sources.
 
-Inputs are held over a communication step, and within it the path of the element is a closed form piece by piece, so
-that the size of the step adds no error of its own. An effect for which there is none is refused.
+Inputs are held over a communication step, or go linearly by the derivatives that FMI 2.0 takes; within it the path is
+that of our own march.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pzd.export.content import Content
 
 NAME = "fmu"
-_COMMON = ("element.c", "model.c")
-_HEADERS = ("element.h", "export.h", "model.h")
+_COMMON = ("model.c",)
+_HEADERS = ("export.h", "model.h")
 
 
 def files(content: Content) -> Files:
@@ -25,18 +25,19 @@ def files(content: Content) -> Files:
 
     Raises
     ------
-    ConfigError : when the damper has an effect that is not carried exactly
+    ConfigError : when an effect of the user's own has a law that C cannot hold
     FilesError : when the compiler refuses the sources
     """
-    from pzd.export.dynamics import Dynamics, data_of, source
+    from pzd.export.dynamics import ELEMENT_SOURCES, Dynamics, element_files, source
     from pzd.export.fmi import IDENTIFIER, build_description, compiled_library, fmi2, fmi3, folders, suffix
 
-    dynamics = Dynamics.of(content.damper, NAME)
-    data, token = data_of(content, dynamics)
+    dynamics = Dynamics.of(content.damper)
+    element, token = element_files(content, dynamics)
     found = {}
     for version, folder in zip((2, 3), folders(), strict=True):
-        to_compile = (f"fmi{version}.c", *_COMMON)
-        sources = {name: source(content, name) for name in (*to_compile, *_HEADERS)} | {"element_data.h": data.encode()}
+        own = (f"fmi{version}.c", *_COMMON)
+        to_compile = (*own, *ELEMENT_SOURCES)
+        sources = {name: source(content, name) for name in (*own, *_HEADERS)} | element
         members = {f"sources/{name}": text for name, text in sources.items()}
         if version == 2:
             members["modelDescription.xml"] = fmi2(content, dynamics, token, to_compile).encode()

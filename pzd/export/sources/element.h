@@ -1,31 +1,36 @@
 /* The Bingham element of Makowski and Knap 2021, eq. (1) to (3), with the effects that were found in the damper.
  *
- * Inputs are held over a step; within it every piece of the path is a closed form. Extension (rebound) is positive.
+ * Inputs go linearly over a step, or are held where both ends are the same. Within the step the path is a closed form
+ * where there is one, and else integrated piece by piece; `laws.c` holds both, and every law. Extension (rebound) is
+ * positive. No memory is allocated. To build: cc -std=c99 -O2 -c element.c laws.c, in single precision with
+ * -DDAMPER_SINGLE.
  */
 #ifndef ELEMENT_H
 #define ELEMENT_H
 
+#include "laws.h"
+
 typedef struct {
-    double deflection; /* elastic deflection x - y of the oil spring [m] */
-    double effective;  /* control signal as the valve feels it */
-    double branch;     /* elastic deflection of the second branch [m] */
+    real path[STATES];       /* elastic deflection x - y of the oil spring [m], and the last flow speed [m/s] */
+    real drive[DRIVES];      /* control signal behind each effect of the drive */
+    real branches[BRANCHES]; /* elastic deflection of each branch [m] */
 } element_state;
 
 typedef struct {
-    double displacement; /* of the rod, counted from the zero of the effects [m] */
-    double velocity;     /* [m/s] */
-    double acceleration; /* for the inertia of the fluid alone [m/s2] */
-    double signal;       /* control signal */
-    double temperature;  /* [degC] */
+    real displacement; /* of the rod, counted from the zero of the effects [m] */
+    real velocity;     /* [m/s] */
+    real acceleration; /* for the inertia of the fluid alone [m/s2] */
+    real signal;       /* control signal */
+    real temperature;  /* [degC] */
 } element_inputs;
 
 /* The state at rest with the inputs, the oil spring carrying a force [N]. */
-element_state element_start(const element_inputs *inputs, double force);
+element_state element_start(const element_inputs *inputs, real force);
 
-/* The state a step [s] later. */
-element_state element_after(element_state state, const element_inputs *inputs, double step);
+/* The state a step [s] later, the inputs going linearly from `start` to `end`. */
+element_state element_after(element_state state, const element_inputs *start, const element_inputs *end, real step);
 
 /* Force at the rod [N]. */
-double element_force(element_state state, const element_inputs *inputs);
+real element_force(element_state state, const element_inputs *inputs);
 
 #endif

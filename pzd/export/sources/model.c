@@ -13,8 +13,7 @@ static element_inputs inputs_of(const model *m)
 
 void model_reset(model *m)
 {
-    const model fresh = {{0.0}, 0.0, {0.0, 0.0, 0.0}, 0};
-    *m = fresh;
+    memset(m, 0, sizeof *m);
     m->values[SIGNAL] = START_SIGNAL;
     m->values[TEMPERATURE] = START_TEMPERATURE;
     m->values[ZERO] = START_ZERO;
@@ -55,6 +54,7 @@ static const char *set_one(model *m, unsigned variable, double value)
     if (m->running && (variable == INITIAL_FORCE || variable == ZERO))
         return "a parameter can be set before the simulation only";
     m->values[variable] = value;
+    m->rates[variable] = 0.0;
     if (variable == DISPLACEMENT)
         m->travel = 0.0;
     return NULL;
@@ -68,13 +68,34 @@ const char *model_set(model *m, const unsigned variables[], size_t count, const 
     return wrong;
 }
 
+static int is_input(unsigned variable)
+{
+    return variable < VARIABLES && variable != FORCE && variable != TIME && variable != INITIAL_FORCE && variable != ZERO;
+}
+
+const char *model_set_rates(model *m, const unsigned variables[], size_t count, const int order[], const double rates[])
+{
+    for (size_t i = 0; i < count; i++) {
+        if (!is_input(variables[i]) || order[i] != 1)
+            return "inputs alone take a derivative, and the first alone";
+        if (!isfinite(rates[i]))
+            return "a value must be finite";
+        m->rates[variables[i]] = rates[i];
+    }
+    return NULL;
+}
+
+/* The displacement goes with the velocity, whatever rate of its own it was given. */
 const char *model_step(model *m, double time, double step)
 {
     if (!(step > 0.0) || !isfinite(step) || !isfinite(time))
         return "a step must be finite and above 0";
-    const element_inputs inputs = inputs_of(m);
-    m->state = element_after(m->state, &inputs, step);
-    m->travel += m->values[VELOCITY] * step;
+    const element_inputs start = inputs_of(m);
+    m->travel += (m->values[VELOCITY] + 0.5 * m->rates[VELOCITY] * step) * step;
+    for (unsigned i = 0; i < VARIABLES; i++)
+        m->values[i] += i != DISPLACEMENT && is_input(i) ? m->rates[i] * step : 0.0;
+    const element_inputs end = inputs_of(m);
+    m->state = element_after(m->state, &start, &end, step);
     m->values[TIME] = time + step;
     return NULL;
 }

@@ -9,7 +9,8 @@
 
 typedef struct {
     double values[VARIABLES];
-    double travel; /* since the displacement was set [m] */
+    double rates[VARIABLES]; /* of inputs that go linearly over a step; 0 for one that is held */
+    double travel;           /* since the displacement was set [m] */
     element_state state;
     int running; /* whether the start values are settled */
 } model;
@@ -17,6 +18,7 @@ typedef struct {
 /* Each of these gives NULL, or what is wrong. */
 const char *model_get(const model *m, const unsigned variables[], size_t count, double values[]);
 const char *model_set(model *m, const unsigned variables[], size_t count, const double values[]);
+const char *model_set_rates(model *m, const unsigned variables[], size_t count, const int order[], const double rates[]);
 const char *model_step(model *m, double time, double step);
 
 /* A state is a copy of the whole model, of its size in memory and in bytes; none is made where `*state` is one. */
