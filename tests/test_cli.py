@@ -544,6 +544,23 @@ def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     assert rows["sine-comfort-ideal: peak |a_K| at K [m/s2]"] == ["200", "100"]
 
 
+def test_compare_writes_a_page_into_the_last_run(typed: Terminal) -> None:
+    shutil.copy("first.yaml", "second.yaml")
+    typed("run", "first.yaml")
+    typed("run", "second.yaml", "--set", "seed=7", "--set", "rig.files.0.path=data/a.csv")
+    assert typed("compare", "runs/first", "runs/second") == 0
+    assert typed.out[-1] == "page: runs/second/compare/first--and--second.html"
+    page = Path("runs/second/compare/first--and--second.html").read_text(encoding="utf-8")
+    assert "Where does second differ from first?" in page
+    assert "stale: runs/second: " in page
+    assert typed("compare", "runs/second", "runs/first") == 0
+    assert typed("compare", "runs/first", "runs/first") == 0
+    assert not any(line.startswith("page: ") for line in typed.out)
+    again = Path("runs/first/compare/second--and--first.html").read_bytes()
+    assert typed("compare", "runs/second", "runs/first") == 0
+    assert Path("runs/first/compare/second--and--first.html").read_bytes() == again
+
+
 def test_compare_puts_a_dash_where_a_run_has_no_such_number(typed: Terminal) -> None:
     shutil.copy("first.yaml", "second.yaml")
     typed("run", "first.yaml")

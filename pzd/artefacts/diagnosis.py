@@ -108,6 +108,8 @@ class Ranked(Frozen):
     parameters: dict[str, float | tuple[float, ...]]
     reason: str
     at_voltage_V: tuple[float, ...] | None = None
+    gap_standard_error: float | None = None
+    """Of `gap_after`, from its scatter between tests; None with a single test, or of an earlier version."""
 
 
 class Region(Frozen):

@@ -43,7 +43,7 @@ def changes(call: Call, second: Second = None, before: From = None, after: To = 
 
 
 def _followed(call: Call, over: str) -> int:
-    from pzd.pipeline.state_comparison import comparison_name, follow_states, write_changes
+    from pzd.pipeline.state_comparison import FOLDER, comparison_name, follow_states, write_comparison
     from pzd.report.changes_page import course_page
     from pzd.report.changes_text import course_lines
     from pzd.schema.validate import plain_data, write_json
@@ -52,8 +52,9 @@ def _followed(call: Call, over: str) -> int:
     found = follow_states(call.opened, over, call.jobs, call.output.say)
     name = comparison_name(found.course.from_, found.course.to)
     with run.locked("pzd changes"):
-        folder = write_changes(
+        folder = write_comparison(
             run,
+            FOLDER,
             name,
             {
                 "json": lambda path: write_json(path, found.course, run.control),
@@ -68,7 +69,7 @@ def _followed(call: Call, over: str) -> int:
 
 def _compared(call: Call, second: Path | None, before: str | None, after: str | None) -> int:
     from pzd.pipeline.command import opened
-    from pzd.pipeline.state_comparison import Named, compare_states, comparison_name, write_changes
+    from pzd.pipeline.state_comparison import FOLDER, Named, compare_states, comparison_name, write_comparison
     from pzd.report.changes_page import changes_page
     from pzd.report.changes_text import changes_lines
     from pzd.schema.validate import plain_data, write_json
@@ -83,8 +84,9 @@ def _compared(call: Call, second: Path | None, before: str | None, after: str | 
     control = other.run.control
     name = comparison_name(found.changes.from_, found.changes.to)
     with other.run.locked("pzd changes"):
-        folder = write_changes(
+        folder = write_comparison(
             other.run,
+            FOLDER,
             name,
             {
                 "json": lambda path: write_json(path, found.changes, control),

@@ -158,9 +158,10 @@ def _stale_lines(found: RunSummary, place: str = "") -> list[str]:
 
 
 def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbose: Verbose = False) -> int:
-    """Print the numbers of several runs side by side.
+    """Print the numbers of several runs side by side, and write a page with their curves over one another.
 
-    A stage whose numbers are not those of the run's config as it is today is called stale, with the reason.
+    The page tells the differences in percent, and which are beyond the intervals; it stands in the folder `compare` of
+    the last run. A stage whose numbers are not those of its config as it is today is called stale, with the reason.
     """
     from pzd.pipeline.run_summary import summary_of
     from pzd.report.columns import aligned
@@ -173,8 +174,13 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
     names = dict.fromkeys(name for column in columns for name in column)
     head = ["", *(str(run.folder) for run in found)]
     output.say(*aligned([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
-    for run in found:
-        output.say(*_stale_lines(run, f"{run.folder}: "))
+    stale = [line for run in found for line in _stale_lines(run, f"{run.folder}: ")]
+    output.say(*stale)
+    if len({run.folder.resolve() for run in found}) > 1:
+        from pzd.pipeline.run_summary import write_runs_page
+
+        marks = [f"not to be trusted: {run.folder}: {mark}" for run in found for mark in run.marks]
+        output.say(f"page: {write_runs_page(found, [*stale, *marks])}")
     return DONE
 
 

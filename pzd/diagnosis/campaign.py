@@ -23,7 +23,7 @@ from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
 from pzd.record import Array, Mask, voltage_scale
-from pzd.signals.measures import criterion
+from pzd.signals.measures import criterion, criterion_error
 from pzd.signals.nuisance import NuisanceConfig
 
 Item = TypeVar("Item")
@@ -120,6 +120,15 @@ class Evidence:
         """Compute W_s over the compared samples of all that is seen."""
         measured = np.concatenate([o.measured for o in self.whole.observations])
         return criterion(measured - np.concatenate(fitted.simulated), measured)
+
+    def criterion_error(self, fitted: FitResult) -> float | None:
+        """Compute the standard error of `criterion` from its scatter between tests; None with fewer than two."""
+        observations = self.whole.observations
+        residuals = [o.measured - force for o, force in zip(observations, fitted.simulated, strict=True)]
+        if len(residuals) < 2:
+            return None
+        squares = np.array([residual @ residual for residual in residuals])
+        return criterion_error(squares, np.array([o.measured @ o.measured for o in observations]))
 
     def validation_problem(self, weights: Evidence) -> Problem:
         """Return the problem of the samples that choose, with these base rows and the weights of other evidence."""

@@ -18,7 +18,7 @@ from pzd.record import Array, Mask
 from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
-from pzd.signals.measures import reversals
+from pzd.signals.measures import criterion_error, reversals
 from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.nuisance import NuisanceConfig, likely_delay, nuisance_forces
 
@@ -217,13 +217,11 @@ def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     forces = np.concatenate([_by_block(j, j.prepared.record.force**2) for j in held_out])
     total = float(forces.sum())
     criterion = float(errors.sum()) / total
-    count = errors.size
-    scatter = float(np.sum((errors - criterion * forces) ** 2)) * count / max(count - 1, 1)
     return Gap(
         before=criterion,
         after=criterion,
         noise_floor=min(sum(noise_floor(j) for j in held_out) / total, criterion),  # at most, but for rounding
-        standard_error=float(np.sqrt(scatter)) / total,
+        standard_error=criterion_error(errors, forces),
         held_out=split.held_out,
         hold_out=split.hold_out,
     )

@@ -149,7 +149,8 @@ def _next_test(
 def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
     """List every candidate at the step that decided on it, best first, adopted ones in front.
 
-    `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
+    `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in; its standard error is that of the
+    scatter between tests.
     """
     rows: dict[str, Ranked] = {}
     for step in selection.steps:
@@ -163,6 +164,7 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
             rows[c.effect] = Ranked(
                 effect=c.effect,
                 gap_after=evidence.criterion(c.fitted),
+                gap_standard_error=evidence.criterion_error(c.fitted),
                 delta_bic=round(c.delta_bic, 3),
                 at_voltage_V=values.pop("at_voltage_V", None),
                 parameters=values,

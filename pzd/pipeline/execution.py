@@ -105,8 +105,10 @@ class Pipeline:
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
         if self._compiles:
             from pzd.simulate.compiled_ahead import in_background
+            from pzd.simulate.policies import policies
 
-            in_background()
+            ridden = (policies()[name] for name in self.config.simulate.policies or ())
+            in_background(("ride", "prediction") if any(policy.aim == "predict" for policy in ridden) else ("ride",))
             self._compiles = False
         begun = time.monotonic()
         artefact = self.made(stage)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,7 +24,10 @@ from pzd.artefacts import (
 )
 from pzd.config import control_of, read_config, validated
 from pzd.pipeline.command import Opened, stale_stages
+from pzd.pipeline.state_comparison import comparison_name, write_comparison
 from pzd.quantities import Control
+from pzd.report.damper_models import DamperModels
+from pzd.report.runs_page import ComparedRun, runs_page
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
@@ -60,6 +63,12 @@ class RunSummary:
     """How well tested settings are predicted from their neighbours."""
     hypotheses: Hypotheses = field(default_factory=Hypotheses)
     """Which shape what is left has, where the verdict is `unexplained`."""
+
+
+COMPARISONS = "compare"
+"""Folder of a run, with a page for each set of runs that it was the last of."""
+_LONGEST_NAME = 120
+"""Characters of the name of such a page: file systems take 255 bytes."""
 
 
 def page_of(run: Run) -> Path:
@@ -138,6 +147,52 @@ def summary_of(folder: Path) -> RunSummary:
         return _beside_its_config(found, Opened(document, validated(document), replace(run, config=config)))
     except UserError as error:
         return replace(found, stale={"all": f"their config would be refused: {'; '.join(error.messages)}"})
+
+
+def compared_runs(found: Sequence[RunSummary]) -> tuple[ComparedRun, ...]:
+    """Return what the page of `pzd compare` shows of several runs, each in its setting in use.
+
+    Raises
+    ------
+    DataError : when a file of a run is at fault
+    """
+    folders = [run.folder for run in found]
+    alike = {folder.name for folder in folders if [one.name for one in folders].count(folder.name) > 1}
+    return tuple(_compared(run, str(run.folder) if run.folder.name in alike else run.folder.name) for run in found)
+
+
+def _compared(found: RunSummary, name: str) -> ComparedRun:
+    run = Run(found.folder, found.folder / CONFIG, found.control)
+    chosen = read_yaml(run.config).data.get("setting")
+    has = {kind for kind in (Diagnosed, Table) if run.stage_folder(kind.folder).manifest is not None}
+    rows = tuple(row for row in found.parameters if chosen in (None, row.setting))
+    diagnosed = run.read(Diagnosed) if Diagnosed in has else None
+    return ComparedRun(
+        name,
+        found.control,
+        DamperModels(diagnosed, rows).final_parameters if diagnosed else rows,
+        found.diagnosis,
+        diagnosed.damper if diagnosed else None,
+        run.read(Table).force if Table in has else (),
+        tuple(row for row in found.characteristics.peak_velocity if chosen in (None, row.setting)),
+        found.comfort,
+    )
+
+
+def write_runs_page(found: Sequence[RunSummary], warnings: Sequence[str]) -> Path:
+    """Write the page that compares runs into the folder of the last one, and return its path.
+
+    Raises
+    ------
+    DataError : when a file of a run is at fault
+    FilesError : when the disk does not take it, or another command is at work in the run
+    """
+    page = runs_page(compared_runs(found), warnings)
+    run = Run(found[-1].folder, found[-1].folder / CONFIG, found[-1].control)
+    name = comparison_name(*(one.folder.resolve().name for one in found), between="--and--")[:_LONGEST_NAME]
+    with run.locked("pzd compare"):
+        write = {"html": lambda path: path.write_text(page, encoding="utf-8", newline="\n")}
+        return write_comparison(run, COMPARISONS, name, write) / f"{name}.html"
 
 
 def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:

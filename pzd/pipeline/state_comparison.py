@@ -136,12 +136,13 @@ def _state(given: Opened, name: str, setting: str | None, jobs: int, *, diagnose
     )
 
 
-def write_changes(run: Run, name: str, files: dict[str, Callable[[Path], None]]) -> Path:
+def write_comparison(run: Run, folder: str, name: str, files: dict[str, Callable[[Path], None]]) -> Path:
     """Write the files of one comparison beside those of others.
 
     Parameters
     ----------
-    run : of the second state
+    run : in whose folder they shall stand
+    folder : for comparisons of their kind
     name : of the comparison
     files : by their ending, what writes each
 
@@ -151,20 +152,20 @@ def write_changes(run: Run, name: str, files: dict[str, Callable[[Path], None]])
     """
 
     def fill(fresh: Path) -> None:
-        for there in sorted((run.folder / FOLDER).glob("*")):
+        for there in sorted((run.folder / folder).glob("*")):
             if there.is_file() and not there.name.startswith("."):
                 shutil.copy2(there, fresh / there.name)
         for ending, write in files.items():
             write(fresh / f"{name}.{ending}")
 
-    run.write_extra(FOLDER, fill)
-    return run.folder / FOLDER
+    run.write_extra(folder, fill)
+    return run.folder / folder
 
 
-def comparison_name(before: str, after: str) -> str:
+def comparison_name(*names: str, between: str = "--to--") -> str:
     """Return the name of the files of a comparison.
 
     >>> comparison_name("gap 0.15 mm", "aged")
     'gap_0.15_mm--to--aged'
     """
-    return "--to--".join(re.sub(r"[^A-Za-z0-9._-]", "_", each) for each in (before, after))
+    return between.join(re.sub(r"[^A-Za-z0-9._-]", "_", each) for each in names)

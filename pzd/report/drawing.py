@@ -135,6 +135,37 @@ def axes(
     return figure, figure.add_axes(box, xlabel=x, ylabel=y)
 
 
+_SHARE_BELOW = 0.32
+"""Of the height for both, for a difference that is drawn below."""
+_BETWEEN = 0.03
+"""Of the height of the figure, between both."""
+
+
+def axes_with_difference(
+    x: str, y: str, difference: str, *, height: float = 3.9, labels: Iterable[str] = ("-0.00",), key: int = 1
+) -> tuple[Figure, Axes, Axes]:
+    """Return a figure with axes for curves, and below, at the same horizontal scale, axes for their difference.
+
+    Parameters
+    ----------
+    x, y, difference : quantity and unit of each axis
+    height, labels, key : as of `axes`
+
+    Returns
+    -------
+    the figure, its upper and its lower axes
+    """
+    figure, upper = axes("", y, height=height, labels=labels, key=key)
+    box = upper.get_position()
+    below = _SHARE_BELOW * box.height
+    upper.set_position((box.x0, box.y0 + below + _BETWEEN, box.width, box.height - below - _BETWEEN))
+    lower = figure.add_axes((box.x0, box.y0, box.width, below), sharex=upper, xlabel=x, ylabel=difference)
+    upper.tick_params(labelbottom=False)
+    lower.margins(y=0.15)
+    figure.align_ylabels()
+    return figure, upper, lower
+
+
 def shortened(label: str) -> str:
     """Return a label that leaves room for the plot beside it: names of files differ at their ends, so the middle goes.
 

@@ -56,6 +56,26 @@ def criterion(residual: Array, measured: Array) -> float:
     return float(residual @ residual / (measured @ measured))
 
 
+def criterion_error(squares: Array, energies: Array) -> float:
+    """Compute the standard error of W_s from its scatter between tests, cycles or other parts.
+
+    Equation: s^2 = n / (n - 1) sum (e_i - W_s f_i)^2 / (sum f)^2, of n parts       Source: Cochran 1977, eq. (6.9)
+
+    Parameters
+    ----------
+    squares : (n,) sum of squares of the residual of each part, e [N^2]
+    energies : (n,) likewise of the measured force, f [N^2]
+
+    Examples
+    --------
+    >>> round(criterion_error(np.array([1.0, 3.0]), np.array([100.0, 100.0])), 4)
+    0.01
+    """
+    total, count = float(energies.sum()), squares.size
+    deviation = squares - float(squares.sum()) / total * energies
+    return float(np.sqrt(deviation @ deviation * count / max(count - 1, 1))) / total
+
+
 WHOLE_STEPS = 0.05
 """Largest median distance of the steps of a quantised channel from a whole number of the least one."""
 

@@ -1,21 +1,21 @@
-"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`.
+"""Compiles the kernels of the ride by riding, in a process of its own, see `compiled_ahead`.
 
 A module of its own, since what it imports must not be imported by the commands that start it.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
-from pzd.simulate.compiled_ahead import lock, mark
+from pzd.simulate.compiled_ahead import Kernels, lock, mark
 from pzd.simulate.config import SimulateConfig
 
 
-def _smallest_ride() -> None:
-    """Ride half a second on a damper of two voltages, by every fidelity."""
+def _smallest_ride(kernels: Kernels) -> None:
+    """Ride half a second on a damper of two voltages, by every fidelity, or by a predictive control."""
     from pzd.damper.compose import steady_force
     from pzd.simulate.stage import simulate
 
@@ -28,21 +28,30 @@ def _smallest_ride() -> None:
         for force in (float(steady_force(damper, u, None, v)),)
     )
     table = Table(forces, (), TableNotes(outside="model", reached_m_per_s=1.0, lost=(), not_monotone=()))
-    config = SimulateConfig(duration_s=0.5, settle_s=0.1)
+    policies = ("comfort_predictive",) if kernels == "prediction" else None
+    config = SimulateConfig(duration_s=0.5, settle_s=0.1, policies=policies)
     simulate(config, Diagnosed.undiagnosed(damper), table, 1, Path())
 
 
-def _once(folder: Path) -> None:
-    """Compile into the folder, unless it was done or another process is at it."""
+def _once(folder: Path, kernels: tuple[Kernels, ...] = ("ride",)) -> None:
+    """Compile into the folder, unless it was done or another process is at it.
+
+    All locks are taken first, so that a ride waits for what has not begun yet as well, and each is given back as soon
+    as its kernels are there: other rides do not wait for those of a predictive control.
+    """
     from filelock import Timeout
 
-    with suppress(Timeout), lock(folder).acquire(blocking=False):
-        if not mark(folder).exists():
-            _smallest_ride()
-            mark(folder).touch()
+    with ExitStack() as rest, suppress(Timeout):
+        held = [rest.enter_context(lock(folder, each).acquire(blocking=False)) for each in kernels]
+        for each, taken in zip(kernels, held, strict=True):
+            if not mark(folder, each).exists():
+                _smallest_ride(each)
+                mark(folder, each).touch()
+            taken.release()
 
 
-if __name__ == "__main__":
+def compile_ahead(kernels: tuple[Kernels, ...]) -> None:
+    """Compile kernels into the cache of this user."""
     from pzd.compiled import cache_folder
 
-    _once(cache_folder())
+    _once(cache_folder(), kernels)

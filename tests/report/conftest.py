@@ -210,7 +210,12 @@ def diagnosis() -> Diagnosis:
                 reason="adopted",
             ),
             Ranked(
-                effect="shear_thinning", gap_after=0.004, delta_bic=-800.0, parameters={"n": 0.9}, reason="stand-in"
+                effect="shear_thinning",
+                gap_after=0.004,
+                delta_bic=-800.0,
+                parameters={"n": 0.9},
+                reason="stand-in",
+                gap_standard_error=0.0005,
             ),
         ),
         rivals=(),

@@ -81,15 +81,16 @@ def test_the_bars_are_errors_in_percent_of_the_force_with_the_interval_of_the_ad
     gap = context.diagnosed.diagnosis.gap
     (panel,) = closing(context)
     (ax,) = panel.figure.axes
-    assert [bar.get_width() ** 2 / 1e4 for bar in ax.patches] == pytest.approx([gap.noise_floor, gap.after, gap.before])
-    ends = ax.collections[0].get_segments()[0][:, 0]
-    expected = [gap.after - 1.96 * gap.standard_error, gap.after + 1.96 * gap.standard_error]
-    assert (ends / 100.0) ** 2 == pytest.approx(expected)
+    assert [(bar.get_width() / 100.0) ** 2 for bar in ax.patches] == pytest.approx(
+        [gap.before, gap.after, gap.noise_floor, 0.0009, 0.004]
+    )
     assert [label.get_text() for label in ax.get_yticklabels()] == [
-        "noise alone",
-        "with orifice quadratic",
-        "simple model",
-    ]
+        "on held-out tests:", "simple model", "with orifice quadratic", "noise alone",
+        "each alone, on tests seen:", "orifice quadratic", "shear thinning",
+    ]  # fmt: skip
+    held_out, candidate = (lines.get_segments()[0][:, 0] for lines in ax.collections)
+    assert (held_out / 100.0) ** 2 == pytest.approx([gap.after + s * 1.96 * gap.standard_error for s in (-1.0, 1.0)])
+    assert (candidate / 100.0) ** 2 == pytest.approx([0.004 + s * 1.96 * 0.0005 for s in (-1.0, 1.0)])
 
 
 def test_the_best_policy_is_the_one_with_the_least_a_w_and_stands_out(run: Any, context_of: Any) -> None:

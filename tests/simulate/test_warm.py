@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from pzd import compiled
 from pzd.simulate import compiled_ahead as ahead
@@ -20,7 +20,7 @@ from pzd.simulate import precompile
 def rides(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """One entry for each ride that would have been compiled."""
     done: list[str] = []
-    monkeypatch.setattr(precompile, "_smallest_ride", lambda: done.append("ride"))
+    monkeypatch.setattr(precompile, "_smallest_ride", done.append)
     return done
 
 
@@ -31,7 +31,7 @@ def test_what_was_compiled_is_not_compiled_again(rides: list[str], tmp_path: Pat
 
 
 def test_a_second_process_leaves_the_compiling_to_the_first(rides: list[str], tmp_path: Path) -> None:
-    with FileLock(tmp_path / ahead.LOCK):
+    with FileLock(ahead.lock(tmp_path).lock_file):
         precompile._once(tmp_path)
         assert rides == []
     precompile._once(tmp_path)
@@ -43,16 +43,41 @@ def test_a_ride_waits_for_the_process_that_compiles_and_not_for_itself(
 ) -> None:
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(precompile, "_smallest_ride", ahead.wait.__wrapped__)
-    precompile._once(tmp_path)  # would never end
+    precompile._once(tmp_path, ("ride", "prediction"))  # would never end
     assert ahead.mark(tmp_path).exists()
     ahead.mark(tmp_path).unlink()
     waiting = threading.Thread(target=ahead.wait.__wrapped__)
-    with FileLock(tmp_path / ahead.LOCK):
+    with FileLock(ahead.lock(tmp_path).lock_file):
         waiting.start()
         waiting.join(0.2)
         assert waiting.is_alive()
     waiting.join(60.0)
     assert not waiting.is_alive()
+
+
+def test_a_ride_does_not_wait_for_the_kernels_of_a_predictive_control(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    free: list[tuple[str, bool, bool]] = []
+
+    def others_can(kernels: str) -> None:
+        """What another process could take while these are compiled."""
+        found = []
+        for each in ("ride", "prediction"):
+            other = FileLock(ahead.lock(tmp_path, each).lock_file)
+            try:
+                with other.acquire(blocking=False):
+                    found.append(True)
+            except Timeout:
+                found.append(False)
+        free.append((kernels, *found))
+
+    monkeypatch.setattr(precompile, "_smallest_ride", others_can)
+    precompile._once(tmp_path, ("ride", "prediction"))
+    assert free == [("ride", False, False), ("prediction", True, False)]
+    assert ahead.mark(tmp_path).exists()
+    assert ahead.mark(tmp_path, "prediction").exists()
 
 
 def test_what_another_copy_of_pzd_compiled_is_no_use(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

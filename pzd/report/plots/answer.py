@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pzd.record import Array, Record
 from pzd.report.blocks import amount, listed, number, spelled
 from pzd.report.context import ReportContext
-from pzd.report.drawing import AXIS, BASELINE, FINAL, MEASURED, MUTED, Panel, Plot, axes, legend, shortened, thinned
+from pzd.report.drawing import (
+    AXIS,
+    BASELINE,
+    FINAL,
+    MEASURED,
+    MUTED,
+    Panel,
+    Plot,
+    axes,
+    axes_with_difference,
+    legend,
+    shortened,
+    thinned,
+)
 from pzd.report.plots.comfort import trade_off_panel
 from pzd.signals.cycles import cycles_of, settled_cycles
 from pzd.signals.measures import rms
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _HEIGHT_IN = 3.9
 """All pictures of a row have one height."""
 
 # --- The loop, and the difference below on its own scale ---
-
-_SHARE_BELOW = 0.32
-"""Of the height for both, for the difference."""
 
 
 def missed_loop(context: ReportContext) -> Iterator[Panel]:
@@ -30,12 +45,7 @@ def missed_loop(context: ReportContext) -> Iterator[Panel]:
     residuals = {record.name: context.damper.residuals(record) for record in context.tests.shown}
     record = max(context.tests.shown, key=lambda one: rms(residuals[one.name][0]))
     velocity, measured, baseline, final = _one_cycle(context, record)
-    figure, upper = axes("", "force [kN]", height=_HEIGHT_IN, labels=("-0.00",), key=1)
-    box = upper.get_position()
-    below = _SHARE_BELOW * box.height
-    upper.set_position((box.x0, box.y0 + below + 0.03, box.width, box.height - below - 0.03))
-    lower = figure.add_axes((box.x0, box.y0, box.width, below), sharex=upper)
-    upper.tick_params(labelbottom=False)
+    figure, upper, lower = axes_with_difference("velocity [m/s]", "force [kN]", "difference [N]", height=_HEIGHT_IN)
     curves = [(context.damper.baseline_name, baseline, BASELINE, "--")]
     curves += [("with what was missing", final, FINAL, "-")] if context.damper.extended else []
     upper.plot(velocity, measured / 1000.0, color=MUTED, linewidth=4.0, label="measured")
@@ -43,10 +53,6 @@ def missed_loop(context: ReportContext) -> Iterator[Panel]:
     for name, force, colour, style in curves:
         upper.plot(velocity, force / 1000.0, color=colour, linestyle=style, linewidth=1.2, label=name)
         lower.plot(velocity, measured - force, color=colour, linestyle=style, linewidth=1.2)
-    lower.set_xlabel("velocity [m/s]")
-    lower.set_ylabel("difference [N]")
-    lower.margins(y=0.15)
-    figure.align_ylabels()
     legend(figure)
     misses = float(np.abs(measured - baseline).max())
     share = f"{number(100.0 * misses / float(np.abs(measured).max()), 2)} % of its peak"
@@ -83,45 +89,96 @@ _NORMAL_95 = 1.96
 """Half-width of a 95 % interval in standard errors."""
 
 
+_MOST_CANDIDATES = 5
+"""Candidates that are drawn, best first: those behind are in the ranking."""
+_BAR = 0.56
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """One model, with what it leaves of the gap."""
+
+    name: str
+    w_s: float
+    colour: str
+    error: float | None
+    """Standard error of W_s; None where there is none."""
+    each: tuple[float, ...] = ()
+    """W_s of each test, predicted by a fit to the others."""
+
+
 def closing(context: ReportContext) -> Iterator[Panel]:
-    """Draw the r.m.s. error on held-out tests of the simple model, of the adopted damper and of noise alone."""
-    gap = context.diagnosed.diagnosis.gap
-    if gap is None:
+    """Draw the r.m.s. error of the simple model, the adopted damper and noise on held-out tests, then the candidates'.
+
+    A candidate is fitted together with T0, C and k, and its error is that on the tests which the fits saw.
+    """
+    if context.diagnosed.diagnosis.gap is None:
         return
-    added = listed([spelled(name) for name in context.diagnosed.damper.effects])
-    rows = [("noise alone", gap.noise_floor, MEASURED), (context.damper.baseline_name, gap.before, BASELINE)]
-    if context.damper.extended:
-        rows.insert(1, (f"with {added}" if added else "with T0, C, k anew", gap.after, FINAL))
-    names = [shortened(name) for name, _, _ in rows]
-    figure, ax = axes("error on held-out tests [%]", height=_HEIGHT_IN, labels=names, key=0)
-    ax.barh(range(len(rows)), [_percent(value) for _, value, _ in rows], color=[c for _, _, c in rows], height=0.5)
-    ends = [_percent(max(gap.after + side * _NORMAL_95 * gap.standard_error, 0.0)) for side in (-1.0, 1.0)]
-    ax.errorbar(
-        [_percent(gap.after)],
-        [1],
-        xerr=[[_percent(gap.after) - ends[0]], [ends[1] - _percent(gap.after)]],
-        color="black",
-        capsize=4.0,
-        linewidth=1.2,
-    )
-    tests = context.diagnosed.diagnosis.prediction
-    for place, column in ((len(rows) - 1, "W_s_plain"), (1, "W_s")):
-        each = [_percent(getattr(test, column)) for test in tests.by] if tests else []
-        ax.plot(each, np.full(len(each), place - 0.33), "|", color=MEASURED, markersize=6.0, alpha=0.6)
-    for place, (_, value, _) in enumerate(rows):
-        right = max(_percent(value), ends[1] if place == 1 else 0.0)
-        ax.annotate(f"{number(_percent(value), 2)} %", (right, place), (6, 0), textcoords="offset points", va="center")
+    held_out, candidates = _held_out_bars(context), _candidate_bars(context)
+    heads = ["on held-out tests:", *([] if not candidates else ["each alone, on tests seen:"])]
+    rows: list[_Bar | str] = [heads[0], *held_out, *heads[1:], *candidates]
+    names = [row if isinstance(row, str) else shortened(row.name) for row in rows]
+    figure, ax = axes("error [% of the force]", height=_HEIGHT_IN, labels=names, key=0)
+    for place, row in enumerate(rows):
+        if isinstance(row, _Bar):
+            _draw_bar(ax, place, row)
     ax.set_yticks(range(len(rows)), names)
-    ax.set_ylim(-0.6, len(rows) - 0.4)
-    ax.margins(x=0.18)
+    for label in (label for label, row in zip(ax.get_yticklabels(), rows, strict=True) if isinstance(row, str)):
+        label.set_fontstyle("italic")
+    ax.tick_params(axis="y", length=0.0)
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.margins(x=0.2)
     ax.set_xlim(left=0.0)
     ax.grid(visible=False, axis="y")
-    texts = "; ".join(f"{name} {number(_percent(value), 2)} %" for name, value, _ in rows[::-1])
-    ticks = " Strokes: each test, predicted by a fit to the others." if tests and tests.by else ""
-    caption = (
-        f"R.m.s. of the error over that of the force, on tests that no fit has seen. Whisker: 95 % interval.{ticks}"
-    )
-    yield Panel(figure, "What closes the gap", f"Error on held-out tests, of the force: {texts}.", caption)
+    texts = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in held_out)
+    also = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in candidates)
+    alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on tests seen: {also}." if also else "")
+    ticks = " Strokes: each test, predicted by a fit to the others." if any(bar.each for bar in held_out) else ""
+    caption = f"R.m.s. of the error over that of the force. Whiskers: 95 % intervals.{ticks}"
+    yield Panel(figure, "What closes the gap", alt, caption)
+
+
+def _held_out_bars(context: ReportContext) -> list[_Bar]:
+    """Return what the simple model, the adopted damper and noise leave of tests that no fit has seen."""
+    diagnosis = context.diagnosed.diagnosis
+    gap, tests = diagnosis.gap, diagnosis.prediction.by if diagnosis.prediction else ()
+    if gap is None:
+        return []
+    added, extended = listed([spelled(name) for name in context.diagnosed.damper.effects]), context.damper.extended
+    plain = tuple(test.W_s_plain for test in tests)
+    bars = [_Bar(context.damper.baseline_name, gap.before, BASELINE, None if extended else gap.standard_error, plain)]
+    if extended:
+        name = f"with {added}" if added else "with T0, C, k anew"
+        bars.append(_Bar(name, gap.after, FINAL, gap.standard_error, tuple(test.W_s for test in tests)))
+    return [*bars, _Bar("noise alone", gap.noise_floor, MEASURED, None)]
+
+
+def _candidate_bars(context: ReportContext) -> list[_Bar]:
+    """Return what each candidate leaves of the tests seen, the adopted ones first."""
+    diagnosis = context.diagnosed.diagnosis
+    return [
+        _Bar(
+            spelled(one.effect),
+            one.gap_after,
+            FINAL if one.effect in diagnosis.effects else MUTED,
+            one.gap_standard_error,
+        )
+        for one in diagnosis.ranking[:_MOST_CANDIDATES]
+    ]
+
+
+def _draw_bar(ax: Axes, place: int, bar: _Bar) -> None:
+    """Draw a bar, its interval, a stroke for each test, and its length in figures behind them."""
+    length, right = _percent(bar.w_s), _percent(bar.w_s)
+    ax.barh(place, length, color=bar.colour, height=_BAR)
+    if bar.error is not None:
+        ends = [_percent(max(bar.w_s + side * _NORMAL_95 * bar.error, 0.0)) for side in (-1.0, 1.0)]
+        whisker = [[length - ends[0]], [ends[1] - length]]
+        ax.errorbar([length], [place], xerr=whisker, color="black", capsize=3.0, linewidth=1.1)
+        right = ends[1]
+    each = [_percent(value) for value in bar.each]
+    ax.plot(each, np.full(len(each), place + 0.5 * _BAR + 0.08), "|", color=MEASURED, markersize=5.0, alpha=0.6)
+    ax.annotate(f"{number(length, 2)} %", (right, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
 
 
 def _percent(w_s: float) -> float:

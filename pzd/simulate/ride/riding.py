@@ -168,6 +168,7 @@ def ride_case(
     y, ride = at_rest(model.car), ride_of(model)
     plan = None
     if case.policy.aim == "predict":
+        wait("prediction")
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
     electronics = electronics_of(config.sensors, config.supply, config.control_period_s, y.size, model.car.arms)
     rng = np.random.default_rng(config.sensors.seed)
