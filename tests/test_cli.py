@@ -454,6 +454,21 @@ def test_show_prints_what_there_is_after_a_part_of_the_stages(typed: Terminal) -
     assert not any("verdict" in line for line in typed.out)
 
 
+def test_report_opens_its_page_in_the_browser(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda address: bool(opened.append(address) or True))
+    assert typed("report", "first.yaml") == 0
+    assert opened == []
+    assert typed("report", "first.yaml", "--open") == 0
+    assert opened == [Path("runs/first/6-report/report.html").resolve().as_uri()]
+
+
+def test_where_no_browser_is_found_the_page_is_named(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("webbrowser.open", lambda address: False)
+    assert typed("report", "first.yaml", "--open") == 5
+    assert typed.err == ["runs/first/6-report/report.html: no browser was found to open it; open the file by hand"]
+
+
 def test_show_says_what_is_not_to_be_trusted(typed: Terminal) -> None:
     typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
     assert typed("show", "first.yaml") == 0

@@ -88,6 +88,24 @@ def spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
+_LONGEST_LABEL = 34
+"""Characters of a label of the vertical axis of a plot: half of the width stays for the axes."""
+
+
+def shortened(label: str) -> str:
+    """Return a label that leaves room for the plot beside it: names of files differ at their ends, so the middle goes.
+
+    Examples
+    --------
+    >>> shortened("damper_12_after_endurance_run_sine_2Hz_150V")
+    'damper_12_after_…run_sine_2Hz_150V'
+    """
+    if len(label) <= _LONGEST_LABEL:
+        return label
+    half = (_LONGEST_LABEL - 1) // 2
+    return f"{label[:half]}…{label[half + 1 - _LONGEST_LABEL :]}"
+
+
 def sentence(text: str) -> str:
     """Return text with a capital at its start and a full stop at its end."""
     text = text.strip()

@@ -14,7 +14,7 @@ import numpy as np
 from pzd.artefacts import SummaryRow
 from pzd.parallel.processes import parallel_map
 from pzd.record import Array
-from pzd.report.blocks import Picture, Pictures
+from pzd.report.blocks import Picture, Pictures, shortened
 from pzd.report.context import ReportContext
 
 if TYPE_CHECKING:
@@ -99,8 +99,6 @@ _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
 """Width of a letter of a tick label."""
 _LEGEND_COLUMNS = 4
-_LONGEST_LABEL = 34
-"""Characters of a label of the vertical axis: half of the width stays for the axes."""
 
 
 def axes(
@@ -164,20 +162,6 @@ def axes_with_difference(
     lower.margins(y=0.15)
     figure.align_ylabels()
     return figure, upper, lower
-
-
-def shortened(label: str) -> str:
-    """Return a label that leaves room for the plot beside it: names of files differ at their ends, so the middle goes.
-
-    Examples
-    --------
-    >>> shortened("damper_12_after_endurance_run_sine_2Hz_150V")
-    'damper_12_after_…run_sine_2Hz_150V'
-    """
-    if len(label) <= _LONGEST_LABEL:
-        return label
-    half = (_LONGEST_LABEL - 1) // 2
-    return f"{label[:half]}…{label[half + 1 - _LONGEST_LABEL :]}"
 
 
 def ticks_named(ax: Axes, labels: Sequence[str], first: float = 0.0) -> None:

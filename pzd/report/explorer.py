@@ -64,7 +64,8 @@ def explorer(context: ReportContext) -> Explorer | None:
     curves = [("measured", "measured"), ("baseline", context.damper.baseline_name)]
     curves += [("final", "with what was missing")] if context.damper.extended else []
     table = tuple(_table(context))
-    tests = [_test(context, record, most) for record in records]
+    named = context.tests.labels(records)
+    tests = [{"label": label} | _test(context, record, most) for record, label in zip(records, named, strict=True)]
     data = {"curves": {key: True for key, _ in curves}, "tests": tests, "table": table}
     shown = [record.name for record in records]
     first = next((shown.index(record.name) for record in context.tests.shown[::-1] if record.name in shown), 0)
@@ -92,9 +93,7 @@ def _test(context: ReportContext, record: Record, most: int) -> dict[str, Any]:
         "B": baseline,
     }
     columns |= {"A": final} if context.damper.extended else {}
-    motion, conditions = context.tests.motion(record), context.tests.conditions(record)
-    parts = dict.fromkeys((motion, conditions, record.name))
-    return {"label": ", ".join(parts), **{name: _rounded(values[rows]) for name, values in columns.items()}}
+    return {name: _rounded(values[rows]) for name, values in columns.items()}
 
 
 def _table(context: ReportContext) -> Iterator[dict[str, Any]]:

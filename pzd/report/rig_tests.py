@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -12,7 +13,7 @@ from pzd.artefacts import Characteristics, Identified, RecordEntry, Rig
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import Control
 from pzd.record import Record, is_constant, voltage_scale
-from pzd.report.blocks import amount
+from pzd.report.blocks import amount, shortened
 
 _SINE_SPEED_RATIO = 1.5
 """A motion whose peak speed is at most so many times that of a sine of its amplitude is a simple swing.
@@ -96,6 +97,20 @@ class RigTests:
         if len(found) != 1 or found[0].frequency_Hz is None:
             return record.name
         return f"{amount(found[0].frequency_Hz, 'Hz')}, {amount(1000.0 * found[0].amplitude_m, 'mm')}"
+
+    def labels(self, records: Sequence[Record]) -> list[str]:
+        """Return each test by its motion and conditions, with its name where others have the same or it has no motion.
+
+        Names of files may be long, and are shortened.
+        """
+        ways = [tuple(dict.fromkeys((self.motion(one), self.conditions(one)))) for one in records]
+        return [
+            ", ".join(
+                shortened(part) if part == record.name else part
+                for part in (*way, *([record.name] if ways.count(way) > 1 else ()))
+            )
+            for way, record in zip(ways, records, strict=True)
+        ]
 
     def is_simple_swing(self, record: Record) -> bool:
         """Tell whether a record has one swing a cycle, as a sine or triangle has and a repeated road has not."""

@@ -15,9 +15,21 @@ from pzd.damper.compose import static_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
-from pzd.report.blocks import Card, Gallery, Notes, Paragraph, Section, amount, listed, number, percent, spelled
+from pzd.report.blocks import (
+    Card,
+    Gallery,
+    Notes,
+    Paragraph,
+    Section,
+    amount,
+    listed,
+    number,
+    percent,
+    shortened,
+    spelled,
+)
 from pzd.report.columns import Cell, Column, Table
-from pzd.report.drawing import AXIS, Panel, axes_with_difference, encoded, legend, shortened, styled
+from pzd.report.drawing import AXIS, Panel, axes_with_difference, encoded, legend, styled
 from pzd.report.page import render
 
 _FOOTER = "Written by pzd compare. Every number of this page stands in the files of the runs, or follows from them."
@@ -168,12 +180,7 @@ def _table(title: str, head: str, unit: str, rows: list[_Row], runs: Sequence[Co
     """Return the values of all runs, and of each but the first its difference, with a word on the intervals."""
     first, *others = (run.name for run in runs)
     columns = [Column("name", head), *(_value_column(run.name, unit) for run in runs)]
-    with_intervals = any(row.value(run.name).interval for row in rows for run in runs)
-    for name in others:
-        columns.append(_share_column(name, first))
-        if with_intervals:
-            columns.append(_beyond_column(name, first))
-    return Table(title, tuple(columns), rows)
+    return Table(title, (*columns, *(_difference_column(name, first) for name in others)), rows)
 
 
 def _value_column(run: str, unit: str) -> Column:
@@ -184,19 +191,15 @@ def _value_column(run: str, unit: str) -> Column:
     return Column(run, run, unit, value)
 
 
-def _share_column(run: str, first: str) -> Column:
-    def share(row: _Row) -> Cell:
-        return row.share(run, first)
+def _difference_column(run: str, first: str) -> Column:
+    """Return the column of a run's differences in %, and whether each is beyond the intervals, where there are any."""
 
-    return Column(f"{run} difference", f"{run}: difference", "%", share, 2, 100.0)
-
-
-def _beyond_column(run: str, first: str) -> Column:
     def told(row: _Row) -> Cell:
-        found = beyond(row.value(first), row.value(run))
-        return None if found is None else "yes" if found else "no"
+        share, found = row.share(run, first), beyond(row.value(first), row.value(run))
+        text = "" if share is None else number(100.0 * share, 2)
+        return ", ".join(filter(None, (text, {True: "beyond", False: "within", None: ""}[found]))) or None
 
-    return Column(f"{run} beyond", f"{run}: beyond the intervals", "", told)
+    return Column(f"{run} difference", f"{run}: difference", "%", told)
 
 
 def _parameter_tables(runs: Sequence[ComparedRun]) -> Iterator[Table]:

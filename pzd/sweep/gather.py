@@ -16,9 +16,9 @@ from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, Scatter, SweepConfig, Uniform
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section
+from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section, shortened
 from pzd.report.columns import Column, Table
-from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, shortened, styled
+from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, styled
 from pzd.report.page import render
 from pzd.schema.csvfile import disarmed, write_rows
 from pzd.schema.errors import counted

@@ -62,7 +62,6 @@ def data_of(page: str) -> Any:
 
 def test_measured_force_and_both_models_are_those_of_the_record(page: str, run: Any) -> None:
     for test, record in zip(data_of(page)["tests"], run.rig.records, strict=True):
-        assert record.name in test["label"]
         rows = np.searchsorted(record.time - record.time[0], np.array(test["t"]) - 1e-6)
         columns = {
             "x": 1000.0 * record.displacement,
@@ -73,6 +72,27 @@ def test_measured_force_and_both_models_are_those_of_the_record(page: str, run: 
         }
         for name, values in columns.items():
             assert np.array(test[name]) == pytest.approx(values[rows], abs=1e-4 * float(np.abs(values).max()))
+
+
+def test_tests_that_are_alike_are_told_apart_by_their_names_cut_where_they_are_long(
+    run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
+    of, entry = run.rig.records[0], run.rig.entries[0]
+    names = ["damper_12_after_endurance_sine_2Hz_30mm_first", "damper_12_after_endurance_sine_2Hz_30mm_again"]
+    measured = tuple(run.identified.measures[0].model_copy(update={"record": name}) for name in names)
+    rig = Rig(
+        tuple(replace(of, name=name) for name in names),
+        tuple(entry.model_copy(update={"name": name, "findings": ()}) for name in names),
+    )
+    alike = replace(run, rig=rig, identified=replace(run.identified, measures=measured))
+    labels = [test["label"].replace("\u00a0", " ") for test in data_of(alike.told().page)["tests"]]
+    assert labels == [
+        "2 Hz, 30 mm, 0 V, 22 °C, damper_12_after_…ne_2Hz_30mm_first",
+        "2 Hz, 30 mm, 0 V, 22 °C, damper_12_after_…ne_2Hz_30mm_again",
+    ]
+    one = replace(alike, rig=Rig(rig.records[:1], rig.entries[:1]))
+    assert data_of(one.told().page)["tests"][0]["label"].replace("\u00a0", " ") == "2 Hz, 30 mm, 0 V, 22 °C"
 
 
 def test_the_page_stays_small_however_many_and_long_the_records_are(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,11 +7,16 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
 
 import pytest
+from test_runs_page import compared
+
+from pzd.quantities import Control
+from pzd.report.runs_page import runs_page
 
 CHROMIUM = shutil.which("chromium")
 QUIET = (
@@ -71,6 +76,9 @@ addEventListener("load", () => {{
     sideways: [...page.querySelectorAll(".scroll")].filter((e) => e.scrollWidth > e.clientWidth + 1).map(named),
     written: [...page.querySelectorAll("img")].flatMap(faults),
     cut: every.filter((e) => style(e).overflowX === "hidden" && e.scrollWidth > e.clientWidth + 1).map(named),
+    broken_by_pages: [...page.querySelectorAll("tr, figure, .card")]
+      .filter((e) => e.offsetHeight && (style(e).breakInside !== "avoid" || e.offsetHeight > {page_height})).map(named),
+    heads_once: [...page.querySelectorAll("thead")].filter((e) => style(e).display !== "table-header-group").map(named),
   }});
 }});
 </script>"""
@@ -91,10 +99,19 @@ def chromium(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
 
 
+A4_WIDTH, A4_HEIGHT = 688, 1005
+"""Pixels of 1/96 inch that the margins of the page leave of 210 x 297 mm."""
+
+
+def printed(page: str) -> str:
+    """Return a page that looks on a screen as it does on paper."""
+    return page.replace("@media print", "@media all")
+
+
 def shown(page: str, width: int, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a page is like in a frame of so many pixels, and what its console says."""
     (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / "frame.html").write_text(FRAME.format(width=width), encoding="utf-8")
+    (folder / "frame.html").write_text(FRAME.format(width=width, page_height=A4_HEIGHT), encoding="utf-8")
     done = chromium(folder, "--window-size=1500,1000", "--dump-dom", (folder / "frame.html").as_uri())
     title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
     assert title is not None, done.stderr
@@ -109,8 +126,36 @@ def test_the_page_fits_the_screen_asks_for_nothing_and_says_what_its_pictures_sh
     assert seen["scroll"] <= width
     assert seen["pictures"] > 5
     assert [seen[name] for name in ("requests", "silent", "broken", "wide", "cut", "written")] == [[]] * 6
-    assert width < 1400 or seen["sideways"] == []
+    assert width < 1024 or seen["sideways"] == []
     assert console == []
+
+
+def test_long_units_and_rides_that_are_alike_fit_their_pictures(run: Any, made_ride: Any, tmp_path: Path) -> None:
+    """a_w of 1.497 and 1.524 m/s2 needs digits on its axis, and a control in clicks makes long names of policies."""
+    made = [
+        made_ride(f"sine-2.25Hz-{name}-dynamic", "sine-2.25Hz", name, "dynamic", {2.25: size}, 2.25, held=held)
+        for name, size, held in (
+            ("best_fixed_voltage", 3.497, {"voltage_V": 62.5}),
+            ("passive", 3.524, {"voltage_V": 0.0}),
+            ("comfort_predictive", 3.51, {}),
+            ("comfort", 3.50, {}),
+        )
+    ]
+    clicks = replace(run.with_rides(made), control=Control("rebound adjuster", "clicks"))
+    seen, _ = shown(str(clicks.told().page), 1400, tmp_path)
+    assert [seen[name] for name in ("wide", "cut", "written", "sideways")] == [[]] * 4
+
+
+def test_the_page_of_compared_runs_fits_every_screen_and_the_paper(tmp_path: Path) -> None:
+    names = ("gap_0.25_mm_new_and_cold", "gap_0.25_mm_after_endurance_run_12", "worn")
+    page = runs_page([compared(name, 300.0 + 20.0 * n) for n, name in enumerate(names)])
+    for width in (400, 1024, 1400):
+        seen, console = shown(page, width, tmp_path)
+        assert [seen[name] for name in ("requests", "silent", "broken", "wide", "cut", "written")] == [[]] * 6
+        assert width < 1024 or seen["sideways"] == []
+        assert console == []
+    seen, _ = shown(printed(page), A4_WIDTH, tmp_path)
+    assert [seen[name] for name in ("wide", "sideways", "cut", "written", "broken_by_pages", "heads_once")] == [[]] * 6
 
 
 def test_what_is_wrong_with_a_page_is_seen(tmp_path) -> None:
@@ -131,6 +176,21 @@ def test_what_is_wrong_with_a_page_is_seen(tmp_path) -> None:
     assert sorted(seen["written"]) == ["cut: beyond in of words", "over one another: one and two in of words"]
     assert seen["scroll"] > 400
     assert any("wrong" in line for line in console)
+
+
+def test_no_table_and_no_picture_is_cut_on_paper(page: str, tmp_path: Path) -> None:
+    """On A4 nothing is wider than the page, and nothing that belongs together is parted by its end."""
+    seen, _ = shown(printed(page), A4_WIDTH, tmp_path)
+    assert seen["width"] == A4_WIDTH
+    assert [seen[name] for name in ("wide", "sideways", "cut", "written", "broken_by_pages", "heads_once")] == [[]] * 6
+
+
+def test_a_table_that_is_cut_on_paper_is_seen(tmp_path: Path) -> None:
+    cells = "".join(f"<td>column{number}</td>" for number in range(40))
+    page = f"""<style>@media print {{ tr {{ break-inside: auto; }} thead {{ display: table-row-group; }} }}</style>
+    <table><thead><tr><th>head</th></tr></thead><tbody><tr>{cells}</tr></tbody></table>"""
+    seen, _ = shown(printed(page), A4_WIDTH, tmp_path)
+    assert [len(seen[name]) > 0 for name in ("wide", "broken_by_pages", "heads_once")] == [True] * 3
 
 
 def test_the_page_prints(page: str, tmp_path: Path) -> None:

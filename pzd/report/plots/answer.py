@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pzd.record import Array, Record
-from pzd.report.blocks import amount, listed, number, spelled
+from pzd.report.blocks import amount, listed, number, shortened, spelled
 from pzd.report.context import ReportContext
 from pzd.report.drawing import (
     AXIS,
@@ -22,7 +22,6 @@ from pzd.report.drawing import (
     axes,
     axes_with_difference,
     legend,
-    shortened,
     thinned,
 )
 from pzd.report.plots.comfort import trade_off_panel
@@ -115,7 +114,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
     if context.diagnosed.diagnosis.gap is None:
         return
     held_out, candidates = _held_out_bars(context), _candidate_bars(context)
-    heads = ["on held-out tests:", *([] if not candidates else ["each alone, on tests seen:"])]
+    heads = ["held-out tests:", *(["seen tests, each alone:"] if candidates else [])]
     rows: list[_Bar | str] = [heads[0], *held_out, *heads[1:], *candidates]
     names = [row if isinstance(row, str) else shortened(row.name) for row in rows]
     figure, ax = axes("error [% of the force]", height=_HEIGHT_IN, labels=names, key=0)
@@ -132,7 +131,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
     ax.grid(visible=False, axis="y")
     texts = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in held_out)
     also = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in candidates)
-    alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on tests seen: {also}." if also else "")
+    alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on seen tests: {also}." if also else "")
     ticks = " Strokes: each test, predicted by a fit to the others." if any(bar.each for bar in held_out) else ""
     caption = f"R.m.s. of the error over that of the force. Whiskers: 95 % intervals.{ticks}"
     yield Panel(figure, "What closes the gap", alt, caption)

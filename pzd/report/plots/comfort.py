@@ -152,16 +152,18 @@ def exposure_chart(context: ReportContext) -> Iterator[Panel]:
 def _exposure_panel(context: ReportContext, road: str, cases: list[str]) -> Panel:
     figure, ax = axes("frequency [Hz]", "acceleration, r.m.s. [m/s²]", height=3.3)
     _exposure_lines(ax)
-    for ride in (ride for ride in context.rated.rides if ride.row.case in cases):
+    rides = [ride for ride in context.rated.rides if ride.row.case in cases]
+    for ride in rides:
         parts = ride.components
         drawn = parts.rms >= _SMALLEST_COMPONENT * float(parts.rms.max())
         colour, controlled = line_of(context, ride.row)
-        label, marker = context.rated.label(ride.row), "s" if controlled else "o"
+        label, marker = context.rated.policy_label(ride.row), "s" if controlled else "o"
         ax.plot(parts.frequency[drawn], parts.rms[drawn], marker, color=colour, markersize=6.0, label=label, zorder=3)
-    legend(figure)
+    legend(figure, 2)
     title = f"Reduced comfort, {context.rated.road_label(road)}"
     alt = f"Components of the rides over {road} on the chart of reduced comfort of ISO 2631:1978."
-    return Panel(figure, title, alt, "Boundaries of ISO 2631:1978: unverified transcription of a withdrawn standard.")
+    caption = "Boundaries of ISO 2631:1978: unverified transcription of a withdrawn standard."
+    return Panel(figure, title, alt, f"Fidelity {rides[0].row.fidelity}. {caption}")
 
 
 def _exposure_lines(ax: Axes) -> None:
@@ -191,6 +193,8 @@ _AROUND_IN = 0.75
 """Height around the lines of names [in]."""
 _LEAST_IN = 3.1
 """Height of a figure with few policies [in]."""
+_LEAST_SPAN = 0.1
+"""Of an axis, as a share of its values."""
 _LEADER = {"arrowstyle": "-", "color": AXIS, "linewidth": 0.5, "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 2.0}
 """From a name to its point."""
 
@@ -218,7 +222,7 @@ def trade_off_panel(
     height = max(_AROUND_IN + _LINE_IN * len(rows), least_height)
     best = context.rated.best(road)
     names = "wheel load, r.m.s. [N]", "a_w [m/s²]"
-    figure, ax = axes(*names, height=height, labels=("0.00",), key=0, right=_NAMES_IN)
+    figure, ax = axes(*names, height=height, labels=("0.000",), key=0, right=_NAMES_IN)
     loads = np.array([row.rms_wheel_load_N for row in rows])
     comfort = np.array([context.rated.a_w(row) for row in rows])
     front = context.rated.pareto_front(rows)
@@ -230,6 +234,8 @@ def trade_off_panel(
     edge = sorted((load, a_w) for row, load, a_w in zip(rows, loads, comfort, strict=True) if row in front)
     ax.step(*zip(*edge, strict=True), where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
     ax.margins(0.09)
+    ax.set_xlim(_widened(*ax.get_xlim()))
+    ax.set_ylim(_widened(*ax.get_ylim()))
     _write_names(ax, context, rows, best)
     values = "; ".join(
         f"{spelled(row.policy)} {amount(a_w, 'm/s2')} and {amount(load, 'N')}"
@@ -242,6 +248,12 @@ def trade_off_panel(
         f"{of}To the left the road feels less of the car, below the passenger less of the road ({rows[0].fidelity})."
     )
     return Panel(figure, title, alt, caption)
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """Return limits that are a share of the values apart at least: rides that are alike shall look so."""
+    more = max(0.5 * _LEAST_SPAN * abs(low + high) / 2.0 - (high - low) / 2.0, 0.0)
+    return low - more, high + more
 
 
 def _trade_off_style(context: ReportContext, row: SummaryRow) -> tuple[str, str]:

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.record import Array, Record
-from pzd.report.blocks import number, spelled
+from pzd.report.blocks import number, shortened, spelled
 from pzd.report.context import ReportContext
-from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend, shortened
+from pzd.report.drawing import BASELINE, FINAL, GRID, MAP, MEASURED, MUTED, Panel, Plot, axes, legend
 from pzd.report.rig_tests import settled
 from pzd.signals.measures import criterion
 
@@ -31,7 +31,8 @@ def held_out_gap(context: ReportContext) -> Iterator[Panel]:
     before = ("before" if extended else "simple model", gap.before, BASELINE)
     bars = [noise, after, before] if extended else [noise, before]
     last = bars[1]
-    figure, ax = axes("W_s on held-out data [-]", height=1.0 + 0.4 * len(bars), labels=[bar[0] for bar in bars], key=0)
+    labels = [bar[0] for bar in bars]
+    figure, ax = axes("W_s on held-out data [-]", height=1.0 + 0.4 * len(bars), labels=labels, key=0, right=0.3)
     ax.barh([b[0] for b in bars], [b[1] for b in bars], color=[b[2] for b in bars], height=0.6)
     whisker = [_NORMAL_95 * gap.standard_error]
     ax.errorbar([last[1]], [last[0]], xerr=whisker, color="black", capsize=3.0, linewidth=1.0)
@@ -55,15 +56,16 @@ def held_out_records(context: ReportContext) -> Iterator[Panel]:
     records = [record for record in context.tests.records if record.name in held_out][:_MOST_RECORDS][::-1]
     if not records:
         return
-    names = [shortened(record.name) for record in records]
+    names = [shortened(label) for label in context.tests.labels(records)]
     before, after = np.array([record_gap(context, record) for record in records]).T
-    figure, ax = axes("W_s [-]", height=1.0 + 0.26 * max(len(names), 3), labels=names)
+    figure, ax = axes("W_s [-]", height=1.0 + 0.26 * max(len(names), 3), labels=names, right=0.3)
     lines = range(len(names))
     ax.hlines(lines, after, before, color=MUTED, linewidth=2.0)
     ax.plot(before, lines, "o", color=BASELINE, label="before")
     ax.plot(after, lines, "s", color=FINAL, label="after")
     ax.set_yticks(lines, names)
     ax.set_xlim(0.0, 1.1 * float(max(before.max(), after.max())))
+    ax.locator_params(axis="x", nbins=4)
     ax.margins(y=0.25)
     legend(figure)
     alt = f"W_s of {len(names)} held-out records; it falls in {int(np.sum(after < before))} of them."
@@ -170,7 +172,7 @@ def ranking(context: ReportContext) -> Iterator[Panel]:
     if not ranked:
         return
     names, height = [spelled(r.effect) for r in ranked], 1.0 + 0.26 * max(len(ranked), 3)
-    figure, ax = axes("W_s left on the tests seen [-]", height=height, labels=names)
+    figure, ax = axes("W_s left on the tests seen [-]", height=height, labels=names, right=0.3)
     colours = [FINAL if r.effect in diagnosis.effects else MUTED for r in ranked]
     ax.barh(names, [r.gap_after for r in ranked], color=colours, height=0.62)
     ax.locator_params(axis="x", nbins=4)
