@@ -72,8 +72,11 @@ def test_the_readme_leads_to_every_other_page() -> None:
     assert missing == []
 
 
-def test_every_command_is_in_the_readme() -> None:
-    code = code_of(page("README.md"))
+COMMANDS = "docs/commands.md"
+
+
+def test_every_command_is_in_the_page_of_the_commands() -> None:
+    code = code_of(page(COMMANDS))
     assert [name for name in commands() if not names(f"pzd {name}", code)] == []
 
 
@@ -82,22 +85,23 @@ def test_every_command_of_a_page_exists(name: str) -> None:
     assert set(re.findall(r"\bpzd ([a-z]+)\b", code_of(page(name)))) - set(commands()) == set()
 
 
-def test_every_option_is_in_the_readme() -> None:
-    code = code_of(page("README.md"))
+def test_every_option_is_in_the_page_of_the_commands() -> None:
+    code = code_of(page(COMMANDS))
     options = {long for command in commands().values() for option in command.params for long in option.opts[:1]}
     assert [option for option in sorted(options) if option.startswith("-") and not names(option, code)] == []
 
 
-def test_every_option_of_the_readme_exists() -> None:
+@pytest.mark.parametrize("name", ["README.md", COMMANDS])
+def test_every_option_of_a_page_exists(name: str) -> None:
     group = typer.main.get_command(app)
     known = {name for command in (group, *commands().values()) for option in command.params for name in option.opts}
-    assert set(re.findall(r"(?<![\w-])--[a-z-]+", code_of(page("README.md")))) - known == set()
+    assert set(re.findall(r"(?<![\w-])--[a-z-]+", code_of(page(name)))) - known == set()
 
 
-def test_every_exit_code_is_in_the_readme() -> None:
+def test_every_exit_code_is_in_the_page_of_the_commands() -> None:
     codes = {output.DONE, output.OWN_FAULT, output.UNTRUSTED, INTERRUPTED}
     codes |= {error.exit_code for error in (ConfigError, DataError, FilesError)}
-    assert codes == {int(code) for code in re.findall(r"^\| (\d+) \|", page("README.md"), re.MULTILINE)}
+    assert codes == {int(code) for code in re.findall(r"^\| (\d+) \|", page(COMMANDS), re.MULTILINE)}
 
 
 def test_every_command_and_option_has_its_help() -> None:
@@ -109,6 +113,16 @@ def test_every_command_and_option_has_its_help() -> None:
         if isinstance(option, TyperOption) and not option.help
     ]
     assert silent == []
+
+
+def test_the_readme_names_every_effect_and_how_many_there_are() -> None:
+    table = page("README.md").partition("## The twenty effects")[2].partition("## ")[0]
+    assert set(re.findall(r"`([a-z]+_?[a-z_]*)`", table)) == set(library())
+    assert len(library()) == 20
+
+
+def test_the_readme_is_three_pages() -> None:
+    assert len(page("README.md").splitlines()) <= 250
 
 
 def test_every_effect_stands_in_the_page_of_the_code_with_its_place_and_parameters() -> None:

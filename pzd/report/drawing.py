@@ -108,7 +108,7 @@ def axes(
     height: float = 3.1,
     labels: Iterable[str] = ("-0.000",),
     key: int = 1,
-    right: float = 0.12,
+    right: float = 0.2,
 ) -> tuple[Figure, Axes]:
     """Return an empty figure of one axes, of a size that stays readable on a telephone.
 

@@ -39,7 +39,7 @@ from pzd.report.plots import library
 from pzd.report.ride_comfort import Comparison, RatedRides
 from pzd.report.sections import damper, missing, passenger, tested, trust
 from pzd.report.sections.missing import least_known, rig_test, verdict
-from pzd.report.sections.passenger import change
+from pzd.report.sections.passenger import SAME, change
 from pzd.schema.errors import counted
 from pzd.simulate.policies import policies
 from pzd.simulate.study.plan import assumed
@@ -157,7 +157,8 @@ def _best(rated: RatedRides, road: str, row: SummaryRow) -> str:
     text = f"{rated.policy_label(row)}, a_w {amount(rated.a_w(row), 'm/s2')}"
     if held is None or held is row:
         return text
-    return f"{text}, {change(rated.a_w(held), rated.a_w(row))} than {_the(held.policy)}"
+    by = change(rated.a_w(held), rated.a_w(row))
+    return f"{text}, {by} {'as' if by == SAME else 'than'} {_the(held.policy)}"
 
 
 def _price(rated: RatedRides, best: Mapping[str, SummaryRow]) -> str:
@@ -225,6 +226,9 @@ def answer(context: ReportContext) -> str:
     if diagnosis.verdict == "named":
         sure = f" ({percent(diagnosis.confidence)} sure)" if diagnosis.confidence is not None else ""
         text = f"The {name} lacks {listed(names)}{sure}"
+    elif diagnosis.verdict == "ambiguous" and diagnosis.effects and diagnosis.rivals:
+        either = listed([spelled(effect) for effect in (*diagnosis.effects, *diagnosis.rivals)], "or")
+        text = f"The {name} lacks {either}, and these tests do not settle which"
     elif diagnosis.verdict == "none":
         text = f"The {name} describes this damper as well as these tests can tell"
     else:

@@ -89,8 +89,11 @@ _NORMAL_95 = 1.96
 
 
 _MOST_CANDIDATES = 5
-"""Candidates that are drawn, best first: those behind are in the ranking."""
+"""Candidates that are drawn: those behind are in the ranking."""
 _BAR = 0.56
+"""Height of a bar, of the distance to the next."""
+_MOST_BEYOND = 3.0
+"""Width of the axes at most, in the longest bar: a single test that no fit predicts leaves the bars to be seen."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
     heads = ["held-out tests:", *(["seen tests, each alone:"] if candidates else [])]
     rows: list[_Bar | str] = [heads[0], *held_out, *heads[1:], *candidates]
     names = [row if isinstance(row, str) else shortened(row.name) for row in rows]
-    figure, ax = axes("error [% of the force]", height=_HEIGHT_IN, labels=names, key=0)
+    figure, ax = axes("error [% of the force]", height=_HEIGHT_IN, labels=names, key=0, right=0.25)
     for place, row in enumerate(rows):
         if isinstance(row, _Bar):
             _draw_bar(ax, place, row)
@@ -126,13 +129,17 @@ def closing(context: ReportContext) -> Iterator[Panel]:
         label.set_fontstyle("italic")
     ax.tick_params(axis="y", length=0.0)
     ax.set_ylim(len(rows) - 0.4, -0.6)
-    ax.margins(x=0.2)
-    ax.set_xlim(left=0.0)
+    longest = max(_percent(bar.w_s + _NORMAL_95 * (bar.error or 0.0)) for bar in (*held_out, *candidates))
+    strokes = [_percent(value) for bar in held_out for value in bar.each]
+    right = 1.2 * longest if not strokes else max(1.2 * longest, min(1.05 * max(strokes), _MOST_BEYOND * longest))
+    ax.set_xlim(0.0, right)
     ax.grid(visible=False, axis="y")
     texts = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in held_out)
     also = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in candidates)
     alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on seen tests: {also}." if also else "")
-    ticks = " Strokes: each test, predicted by a fit to the others." if any(bar.each for bar in held_out) else ""
+    beyond = sum(stroke > right for stroke in strokes)
+    ticks = " Strokes: each test, predicted by a fit to the others." if strokes else ""
+    ticks += f" {beyond} of them are beyond the edge." if beyond else ""
     caption = f"R.m.s. of the error over that of the force. Whiskers: 95 % intervals.{ticks}"
     yield Panel(figure, "What closes the gap", alt, caption)
 
@@ -153,8 +160,9 @@ def _held_out_bars(context: ReportContext) -> list[_Bar]:
 
 
 def _candidate_bars(context: ReportContext) -> list[_Bar]:
-    """Return what each candidate leaves of the tests seen, the adopted ones first."""
+    """Return what each candidate leaves of the tests seen, the adopted ones first, then those that leave least."""
     diagnosis = context.diagnosed.diagnosis
+    ranked = sorted(diagnosis.ranking, key=lambda one: (one.effect not in diagnosis.effects, one.gap_after))
     return [
         _Bar(
             spelled(one.effect),
@@ -162,7 +170,7 @@ def _candidate_bars(context: ReportContext) -> list[_Bar]:
             FINAL if one.effect in diagnosis.effects else MUTED,
             one.gap_standard_error,
         )
-        for one in diagnosis.ranking[:_MOST_CANDIDATES]
+        for one in ranked[:_MOST_CANDIDATES]
     ]
 
 

@@ -157,13 +157,17 @@ def _supply(context: ReportContext) -> Iterator[str]:
 # --- Changes in words ---
 
 
+SAME = "the same"
+"""What `change` says where nothing changed."""
+
+
 def change(before: float, after: float) -> str:
     """Return a change in percent, in words."""
     if before == 0.0:
         return DASH
     share = after / before - 1.0
     if abs(share) < _SAME:
-        return "the same"
+        return SAME
     return f"{percent(abs(share))} {'less' if share <= 0.0 else 'more'}"
 
 
