@@ -88,7 +88,7 @@ def spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
-_LONGEST_LABEL = 34
+_LONGEST_LABEL = 32
 """Characters of a label of the vertical axis of a plot: half of the width stays for the axes."""
 
 
@@ -98,7 +98,7 @@ def shortened(label: str) -> str:
     Examples
     --------
     >>> shortened("damper_12_after_endurance_run_sine_2Hz_150V")
-    'damper_12_after_…run_sine_2Hz_150V'
+    'damper_12_after…un_sine_2Hz_150V'
     """
     if len(label) <= _LONGEST_LABEL:
         return label

@@ -33,7 +33,9 @@ def context_of(*records: Record, baseline: Array | float = 0.0, final: Array | f
     for record in records:
         still = np.zeros(record.force.size)
         damper._forces[record.name] = (still + baseline, still + final)
-    tests = SimpleNamespace(sampled=records, records=records, level=lambda _: 0.0)
+    tests = SimpleNamespace(
+        sampled=records, records=records, level=lambda _: 0.0, labels=lambda of: [record.name for record in of]
+    )
     return SimpleNamespace(tests=tests, damper=damper, identified=SimpleNamespace(measures=()))
 
 
