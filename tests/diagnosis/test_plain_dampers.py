@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,3 +89,18 @@ def test_an_elasto_plastic_damper_at_three_voltages_is_plain(rng: Generator) -> 
     for row, T0 in zip(rows, (201.0, 322.0, 442.0), strict=True):
         assert pytest.approx(T0, rel=1e-3) == row.T0_N
         assert row.k_N_per_m == pytest.approx(1.19e5, rel=0.01)
+
+
+@pytest.mark.parametrize("tau", [0.01, 0.05])
+def test_the_late_force_of_a_slow_converter_is_named(tau: float, rng: Generator) -> None:
+    """A bridge converter of 80 values a second settles in four: home-made stands are up to 50 ms late."""
+    rate = 500.0
+    late = [
+        replace(each, force=np.roll(each.force, round(tau * rate)) + rng.standard_normal(each.force.size))
+        for each in (record_of(300.0, 1000.0, 2e5, sine, np.zeros(2000), rate) for sine in THREE)
+    ]
+    (_, found) = diagnosed(late)
+    assert found.diagnosis.verdict == "named", found.diagnosis.reason
+    assert found.diagnosis.effects == ("sensor_delay",)
+    value = found.diagnosis.parameters["sensor_delay"]["tau"].value
+    assert value == pytest.approx(tau, abs=2e-4)

@@ -1,7 +1,7 @@
 """Delay between the recorded force and displacement: a filter or another converter in one of the channels.
 
 Law: F recorded at t - tau; the force is late where tau is positive, the displacement where it is negative.
-Range: 0.1-5 ms.
+Range: 0.1-5 ms; slow converters up to 50 ms.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
-LATEST = 0.03
+LATEST = 0.06
 """Largest delay between two channels of one stand [s].
 
-Three times the group delay of a filter of second order at 20 Hz (0.011 s), as slow as filters of a rig get.
+Load cells of home-made stands are read by bridge converters of 80 values a second, which settle in four: 0.05 s.
 """
 
 _SEARCH = Search(lambda _: 1.0e-3, (0.0,))
