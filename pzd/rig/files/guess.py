@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -361,13 +360,7 @@ def _events(file: SniffedFile) -> Iterator[str]:
 
 
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
-    dialect = file.dialect
-    options: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
-    if dialect.headless:
-        options["header"] = dialect.header
-    if file.form == TEXT:
-        options |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
-    return FilesEntry(path=str(file.path), split=split, **options)
+    return file.dialect.entry(file.path, file.form, split)
 
 
 def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
