@@ -84,6 +84,10 @@ FILES = {
     "Spanish in a Windows code page": FieldFile("Tiempo (s);Desplazamiento (mm);Fuerza (N)\n" + GERMAN, "cp1252"),
     "Italian with tabs": FieldFile("Tempo [s]\tSpostamento [mm]\tForza [N]\n" + GERMAN.replace(";", "\t")),
     "German with strokes": FieldFile("Zeit/s;Weg/mm;Kraft/N\n" + GERMAN),
+    "whole numbers in the first row of decimal commas": FieldFile(
+        "Zeit [s];Weg [mm];Kraft [N]\n" + rows(TIME, 1e3 * X, np.round(FORCE), separator=";", decimal=","),
+        fineness=(1e-8, 0.51),
+    ),
     "Polish in its code page": FieldFile("Czas [s];Przemieszczenie [mm];Si\u0142a [N]\n" + GERMAN, "cp1250"),
     "grams-force": FieldFile("Time (s),Position (mm),Force (gf)\n" + rows(TIME, 1e3 * X, FORCE / GRAM)),
     "grams, which are none of a force": FieldFile(

@@ -296,7 +296,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield f'separator: "{dialect.separator}"'
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
-    if dialect.decimal == "," and any("," in cell for cell in dialect.first):
+    if dialect.decimal == ",":
         yield "decimal: ','"
     if dialect.units_row:
         yield "units_row: true"

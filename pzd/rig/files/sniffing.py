@@ -404,7 +404,7 @@ def _table(
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
-    return (len(alike), sum(numbers[n] for n in alike[:1])), found
+    return (len(alike), sum(numbers[n] for n in alike)), found
 
 
 def _headless(
@@ -417,7 +417,7 @@ def _headless(
         return None
     header = tuple(f"column{n + 1}" for n in range(width))
     found = Dialect(header, None, tuple(rows[0]), encoding, separator, decimal, headless=True)
-    return (len(alike), numbers[0]), found
+    return (len(alike), sum(numbers[n] for n in alike)), found
 
 
 def _unquoted(cell: str) -> str:
