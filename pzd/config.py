@@ -19,7 +19,7 @@ from pydantic import (
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
-from pzd.force_table.config import TableConfig
+from pzd.force_table.config import DamperConfig, TableConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.config import EngineConfig
 from pzd.quantities import Control
@@ -36,10 +36,9 @@ _STAGES = ("rig", "identify", "diagnose", "table", "simulate", "report")
 
 
 def _rig_may_stand_elsewhere(schema: dict[str, Any], model: type[RunConfig]) -> None:
-    """Require `rig` only where the config extends no other one, in which it may stand."""
+    """Require `rig` or `damper` only where the config extends no other one, in which it may stand."""
     for_editors(schema, model)
-    del schema["required"]
-    schema["anyOf"] = [{"required": ["rig"]}, {"required": ["extends"]}]
+    schema["anyOf"] = [{"required": ["rig"]}, {"required": ["damper"]}, {"required": ["extends"]}]
 
 
 SCHEMA = Path(__file__).with_name("config.schema.json")
@@ -130,8 +129,10 @@ class RunConfig(Frozen):
     """Which of the rig's settings diagnose and everything behind it use; needed where there are several."""
     car: bool = True
     """Whether the damper is ridden in a car; with `false` the run ends with a report on the damper alone."""
-    rig: RigConfig
-    """Where the rig records come from."""
+    rig: RigConfig | None = None
+    """Where the rig records come from. Needed, unless `damper` stands in its place."""
+    damper: DamperConfig | None = None
+    """In place of a rig: dampers of measured curves or of other runs; the first stage is then `table`."""
     identify: IdentifyConfig = IdentifyConfig()
     """How the Bingham parameters are found."""
     diagnose: DiagnoseConfig = DiagnoseConfig()
@@ -155,6 +156,30 @@ class RunConfig(Frozen):
         if extends is not None:  # what stands in the file is taken in when it is read
             raise ValueError("stands in the config alone, for --set comes after it")
         return extends
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> RunConfig:
+        if self.rig is None and self.damper is None:
+            raise ValueError("say where the damper comes from: rig, or damper where it is known already")
+        if self.damper is None:
+            return self
+        if self.rig is not None:
+            raise ValueError("damper: rig and damper stand in each other's place; take one away")
+        if self.setting is not None:
+            raise ValueError("setting: a damper without a rig has none; take this key away")
+        return self
+
+    @property
+    def measured_rig(self) -> RigConfig:
+        """The block `rig`.
+
+        Raises
+        ------
+        ConfigError : when the dampers are known without one
+        """
+        if self.rig is None:
+            raise ConfigError("damper: this needs the records of a rig, and the config has none: say rig in its place")
+        return self.rig
 
     @field_validator("simulate")
     @classmethod

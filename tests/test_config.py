@@ -56,7 +56,7 @@ def test_stages_is_read_as_the_former_spelling_of_car(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{}\n", "c.yaml:1:1: rig: is missing"),
+        ("{}\n", "c.yaml:1:1: say where the damper comes from: rig, or damper"),
         ("sed: 2\n" + SMALLEST, "c.yaml:1:1: sed: no such key; did you mean seed? (got sed)"),
         (SMALLEST + "      sign: {force: 2}\n", "c.yaml:4:21: rig.files.0.sign.force: must be one of 1 or -1 (got 2)"),
         ("seed: '2'\n" + SMALLEST, "c.yaml:1:7: seed: must be a whole number (got 2)"),
@@ -81,7 +81,7 @@ def test_stages_is_read_as_the_former_spelling_of_car(tmp_path: Path) -> None:
         ("rig: {files: [{path: a, paht: b}]}\n", "c.yaml:1:25: rig.files.0.paht: no such key; did you mean path?"),
         ("rig: {files: []}\n", "c.yaml:1:14: rig.files: "),
         ("rig: {}\n", "c.yaml:1:6: rig: "),
-        ("rig:\n", "c.yaml:1:5: rig: must be a mapping (got null)"),
+        ("rig:\n", "c.yaml:1:1: say where the damper comes from: rig, or damper"),
     ],
 )
 def test_a_mistake_is_said_in_one_line_with_its_place(tmp_path: Path, text: str, message: str) -> None:

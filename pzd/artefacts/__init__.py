@@ -30,6 +30,7 @@ from pzd.artefacts.identified import (
     identified_damper,
 )
 from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
+from pzd.artefacts.mounted import MountedDamper, MountedDampers, MountedNotes, damper_without_force
 from pzd.artefacts.report import ComfortRow, Manifest, ReferenceRow, Report
 from pzd.artefacts.rides import (
     AXLE_COLUMNS,
@@ -51,4 +52,4 @@ from pzd.artefacts.rides import (
 from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
-Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
+Artefact = Rig | Identified | Diagnosed | Table | MountedDampers | Rides | Report

@@ -29,10 +29,13 @@ def sweep(call: Call, status: Status = False) -> int:
 
     What is finished stays: a sweep that was stopped goes on where it was.
     """
+    from pzd.schema.errors import ConfigError
     from pzd.sweep.campaign import SweepRuns
     from pzd.sweep.task import BaseRun
 
     given, output = call.opened, call.output
+    if given.config.damper is not None:
+        raise ConfigError("damper: pzd sweep needs a rig in its place; run the config by itself")
     campaign = SweepRuns.of(BaseRun(call.config, call.runs, call.overrides), output.progress)
     if status:
         output.say(*_status(campaign))
@@ -77,7 +80,7 @@ def blind(call: Call) -> int:
     given, base = call.opened, call.config.parent
     setup, whole = _setup(given.config), given.config
     places = folder_of(given.run.folder / FOLDER, setup.blind)
-    methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
+    methods = Methods(whole.identify, whole.diagnose, whole.measured_rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
         refuse_links_below(places.folder)
         made_from = _made_from(whole)
@@ -103,9 +106,11 @@ def _setup(config: RunConfig) -> BenchmarkSetup:
 
     if config.blind is None:
         raise ConfigError("blind: the config has no such block; configs/blind.yaml is an example")
-    if config.rig.virtual is None or len(config.rig.virtual) != 1:
+    if config.measured_rig.virtual is None or len(config.measured_rig.virtual) != 1:
         raise ConfigError("rig.virtual: pzd blind needs one virtual stand, whose damper the cases start from")
-    return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+    return BenchmarkSetup(
+        config.blind, config.measured_rig.virtual[0], config.diagnose.nuisance, config.control.signal()
+    )
 
 
 def _entered(blind: BlindConfig, made_from: str, folder: Path) -> None:

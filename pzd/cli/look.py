@@ -14,7 +14,7 @@ from pzd.report.diagnosis_text import diagnosis_lines
 from pzd.schema.errors import ConfigError, counted
 
 if TYPE_CHECKING:
-    from pzd.artefacts import IngestRow, RecordEntry
+    from pzd.artefacts import IngestRow, MountedDampers, RecordEntry
     from pzd.pipeline.run_summary import RunSummary
     from pzd.report.columns import Table
 
@@ -47,6 +47,8 @@ def check(call: Call, plot: PlotFile = None) -> int:
 
     given, output = call.opened, call.output
     _check_plot(plot)
+    if given.config.damper is not None:
+        return _check_mounted(call, plot)
     rig = preflight(given)
     if plot is not None:
         from pzd.report.page import records_page
@@ -61,6 +63,26 @@ def check(call: Call, plot: PlotFile = None) -> int:
     found = counted(sum(len(entry.findings) for entry in rig.entries), "finding")
     wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
     output.say(f"{counted(len(rig.entries), 'record')}, {found}; the config is in order, {wrote}")
+    return DONE
+
+
+def _check_mounted(call: Call, plot: Path | None) -> int:
+    """Check dampers that are known without a rig, and say how they were read."""
+    from pzd.pipeline.command import check_roads, mounted_dampers
+    from pzd.schema.validate import plain_data
+
+    if plot is not None:
+        raise ConfigError(
+            f"--plot {plot}: draws the records of a rig, and this config has none; pzd report draws curves"
+        )
+    mounted, output = mounted_dampers(call.opened), call.output
+    check_roads(call.opened)
+    if output.as_json:
+        notes = [axle.notes for axle in mounted.axles]
+        output.say_json(plain_data({"config": call.config.as_posix(), "dampers": notes}, call.opened.run.control))
+    for name, axle in mounted.named_axles:
+        output.say(f"{name or 'front and rear'}: {axle.notes.source}", *(f"  {line}" for line in axle.notes.read))
+    output.say("the config is in order, nothing was written")
     return DONE
 
 
@@ -122,6 +144,8 @@ def _sections(found: RunSummary) -> Iterator[tuple[str, list[str]]]:
         *tables.knee(found.knees, found.control),
     ):
         yield _titled(table)
+    if found.mounted is not None:
+        yield "dampers", [f"  {line}" for line in _mounted_lines(found.mounted)]
     yield _titled(tables.parameters(found.parameters, found.control).without("rmse_N"))
     lines = diagnosis_lines(found.diagnosis, found.control, hypotheses=found.hypotheses) if found.diagnosis else []
     yield "diagnosis", [f"  {line}" for line in lines]
@@ -130,6 +154,12 @@ def _sections(found: RunSummary) -> Iterator[tuple[str, list[str]]]:
     yield _titled(tables.rides(found.summary))
     yield "assumed, since the config does not say it", [f"  {line}" for line in found.assumed]
     yield _titled(tables.comfort(found.comfort))
+
+
+def _mounted_lines(mounted: MountedDampers) -> Iterator[str]:
+    """Yield where the dampers of a run without a rig come from, and how they were read."""
+    for name, axle in mounted.named_axles:
+        yield f"{name or 'front and rear'}: {axle.notes.source}; {'; '.join(axle.notes.read)}"
 
 
 def _titled(table: Table) -> tuple[str, list[str]]:
@@ -227,6 +257,7 @@ def _run_as_data(run: RunSummary) -> dict[str, Any]:
         "settings": run.settings,
         "settings_left_out": run.settings_left_out,
         "hypotheses": run.hypotheses.rows,
+        "dampers": [axle.notes for axle in run.mounted.axles] if run.mounted else [],
         "rides": run.summary,
         "assumed": run.assumed,
         "comfort": run.comfort,

@@ -80,6 +80,8 @@ class Content:
     """Files of the run that were edited by hand since it was written."""
     marks: tuple[str, ...] = ()
     """Why the damper is not to be trusted."""
+    by_curve: bool = False
+    """Whether it is known by a measured curve alone: its table holds all of it, and `damper` is without force."""
 
     @property
     def origin(self) -> str:
@@ -255,6 +257,9 @@ class Columns:
 
 def tables(content: Content) -> dict[str, Columns]:
     """Return the tables of a damper by name, without those that have no row."""
+    if content.by_curve:
+        inverse = {"inverse": _columns(content, InverseRow, content.table.inverse)} if content.table.inverse else {}
+        return {"force": _columns(content, ForceRow, content.table.force)} | inverse
     damper = content.damper
     reference = ReferencePointRow(reference_temperature_degC=damper.reference_temperature_degC, zero_m=damper.zero_m)
     every = {

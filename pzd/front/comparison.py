@@ -159,7 +159,7 @@ def changes(
         settings[0],
         config.diagnose,
         config.identify,
-        config.rig,
+        config.measured_rig,
         signal,
         jobs,
     )

@@ -69,4 +69,4 @@ def pipeline_on(
     if limits is not None and not isinstance(limits, Mapping):
         raise TypeError(f"limits: must be a mapping such as {{'stroke_m': 0.1}} (got {type(limits).__name__})")
     config = config_of(control, setting, rig={"limits": dict(limits or {})}, **blocks)
-    return pipeline_of(config, {Rig.folder: rig_of(tests, config.rig.limits, control, called)})
+    return pipeline_of(config, {Rig.folder: rig_of(tests, config.measured_rig.limits, control, called)})

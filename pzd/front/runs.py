@@ -74,6 +74,8 @@ class FinishedRun(Result):
         from pzd.front.pipelines import pipeline_of
         from pzd.runs import CONFIG
 
+        if self.found.mounted is not None:
+            raise ValueError(f"{self.folder}: no rig was measured; Damper.from_curve makes a damper of its curve")
         if self.found.diagnosis is None:
             raise ValueError(f"{self.folder}: diagnose has not run; pzd.run makes it")
         with as_python_errors():

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pzd.artefacts import RecordEntry, Rig
+from pzd.artefacts import MountedDampers, RecordEntry, Rig
 from pzd.config import RunConfig, check_settings, read_config, validated
 from pzd.identification.stage import refuse_one_condition, refuse_partly_recorded
 from pzd.parallel.processes import Listener, no_listener
@@ -140,6 +140,8 @@ def _check_reference(given: Opened) -> None:
 def _right_source(line: Sequence[Stage], target: str) -> None:
     if target == "simulate" and target not in [stage.name for stage in line]:
         raise ConfigError("pzd simulate: car: false leaves the rides out; take this key out of the config")
+    if line[0].name == "table" and target not in [stage.name for stage in line]:
+        raise ConfigError(f"pzd {target}: the config has damper and no rig, so the first command is pzd table")
     if target not in [stage.name for stage in line]:
         held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")
@@ -165,6 +167,22 @@ def preflight(given: Opened) -> Rig:
             return Rig((), ())
         refuse_one_condition(given.config.identify, made, given.run.control)
         refuse_partly_recorded(made, given.run.control)
+    return made
+
+
+def mounted_dampers(given: Opened) -> MountedDampers:
+    """Return the dampers of a config without a rig, read and tabulated; written nowhere.
+
+    Raises
+    ------
+    UserError : what a run would be refused for
+    """
+    _check_reference(given)
+    (first, *_) = stages(given.config)
+    with given.placed():
+        made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
+    if not isinstance(made, MountedDampers):
+        raise ConfigError(f"{given.run.config}: the config has a rig")
     return made
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from pydantic import BaseModel
 
 import pzd
-from pzd.artefacts import RecordEntry, Rig
+from pzd.artefacts import Diagnosed, RecordEntry, Rig, Table
 from pzd.config import RunConfig, check_settings
 from pzd.own_effects import own_files
 from pzd.pipeline.stages import Stage
@@ -271,6 +271,7 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:
 
     paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     files = [file for value in paths for file in matching(folder, value)]
+    files += _files_of_dampers(values, folder)
     layouts = [value for path, value in values.items() if path.endswith(".layout") and isinstance(value, str)]
     files += [file for name in layouts if (file := folder / f"{name}.yaml").is_file()]
     if expected := values.get("report.reference"):
@@ -278,3 +279,17 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:
 
         files += [path for path in (path_of(expected, folder),) if path.is_file()]
     return files
+
+
+def _files_of_dampers(values: Mapping[str, Any], folder: Path) -> Iterator[Path]:
+    """Yield the files of `damper`: of curves, and those of other runs that its stage reads."""
+    from pzd.rig.files.reading import matching
+
+    for path, value in values.items():
+        if not path.startswith("damper.") or not isinstance(value, str):
+            continue
+        if path.endswith(".curve"):
+            yield from matching(folder, value)
+        elif path.endswith(".run"):
+            found = (p for kind in (Diagnosed, Table) for p in (folder / value / kind.folder).rglob("*") if p.is_file())
+            yield from sorted(found)

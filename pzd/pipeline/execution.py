@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from pzd.artefacts import Artefact, Diagnosed, Identified, Rides, Rig
+from pzd.artefacts import Artefact, Diagnosed, Identified, MountedDampers, Rides, Rig, Table
 from pzd.config import RunConfig, setting_in_use
 from pzd.parallel.processes import Listener, no_listener
 from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
@@ -156,8 +156,20 @@ class Pipeline:
     def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
         """Return the marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
         if state.edited:
-            return self._carried(stage, self._untrusted(self.read_back(stage.makes)))
+            artefact = self.read_back(stage.makes)
+            return self._carried(stage, (*self._untrusted(artefact), *self._not_followed(artefact, state)))
         return state.manifest.marks if state.manifest else ()
+
+    def _not_followed(self, artefact: Artefact, state: StageFolder) -> tuple[str, ...]:
+        """Return which rides do not follow a table that was edited by hand: those on the law of the damper itself."""
+        with_law = isinstance(artefact, MountedDampers) and all(axle.damper for axle in artefact.axles)
+        if not (self.config.car and "dynamic" in self.config.simulate.fidelities):
+            return ()
+        if not (isinstance(artefact, Table) or with_law):
+            return ()
+        files = ", ".join(f"{artefact.folder}/{name}" for name in state.edited)
+        follow = "rides at the fidelity table follow it, and those at dynamic have the damper's own law"
+        return (f"{files} edited by hand: {follow}",)
 
     def _untrusted(self, artefact: Artefact) -> tuple[str, ...]:
         """Why an artefact is not to be trusted as it stands, in the units of the config."""

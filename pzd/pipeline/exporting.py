@@ -8,9 +8,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.artefacts import Diagnosed, Identified, Table
+from pzd.artefacts import Diagnosed, Identified, MountedDampers, Table, damper_without_force
 from pzd.export.content import WRITTEN_BY_PZD, Content
-from pzd.export.formats import Format, format_of
+from pzd.export.formats import Format, format_of, formats
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, refuse_links, versions, write_afresh
 from pzd.schema.errors import ConfigError, FilesError
@@ -56,11 +56,17 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     """
     wanted = format_of(to)
     _check_fresh(given, remedy)
-    content = content_of(given)
-    if content.edited:
-        log.warning("%s: edited by hand: %s; exported as it is", given.run.folder, ", ".join(content.edited))
+    contents = (content_of(given),) if given.config.damper is None else _mounted_contents(given)
+    edited = list(dict.fromkeys(name for content in contents for name in content.edited))
+    if edited:
+        log.warning("%s: edited by hand: %s; exported as it is", given.run.folder, ", ".join(edited))
+    if wanted.dynamics and any(content.by_curve for content in contents):
+        raise ConfigError(
+            f"--to {to}: it holds the dynamics of a damper, and a measured curve has none; choose a form of its table, "
+            f"{', '.join(name for name, one in formats().items() if not one.dynamics)}"
+        )
     with given.placed():
-        files = wanted.files(content)
+        files = {name: data for content in contents for name, data in wanted.files(content).items()}
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
         if out is None:
@@ -72,19 +78,20 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
             fresh = folder / f".{name}.new"
             write_afresh(fresh, data)
             fresh.replace(folder / name)
-        for path in _outdated(folder, wanted, content, files):
+        for path in _outdated(folder, wanted, given.run.config, files):
             path.unlink()
-            log.info("%s: removed, as the damper of %s has no such part any more", path, content.config)
-    return Exported(tuple(folder / name for name in files), content.marks)
+            log.info("%s: removed, as the damper of %s has no such part any more", path, given.run.config.name)
+    marks = dict.fromkeys(mark for content in contents for mark in content.marks)
+    return Exported(tuple(folder / name for name in files), tuple(marks))
 
 
-def _outdated(folder: Path, wanted: Format, content: Content, files: Collection[str]) -> list[Path]:
+def _outdated(folder: Path, wanted: Format, config: Path, files: Collection[str]) -> list[Path]:
     """Return files that an earlier export of this config in this form left and the new one does not write."""
     if wanted.ending is None:
         return []
-    ours = re.compile(WRITTEN_BY_PZD.pattern + re.escape(content.config.encode()) + rb"(?![\w.-])")
+    ours = re.compile(WRITTEN_BY_PZD.pattern + re.escape(config.name.encode()) + rb"(?![\w.-])")
     left = [path for path in sorted(folder.glob(f"*{wanted.ending}")) if path.name not in files]
-    return [path for path in left if path.name.startswith(content.name) and ours.search(path.read_bytes())]
+    return [path for path in left if path.name.startswith(config.stem) and ours.search(path.read_bytes())]
 
 
 def _check_own(files: Iterable[Path]) -> None:
@@ -124,8 +131,35 @@ def content_of(given: Opened) -> Content:
     )
 
 
+def _mounted_contents(given: Opened) -> tuple[Content, ...]:
+    """Return what there is to export of dampers that are known without a rig, called after their axles.
+
+    Raises
+    ------
+    DataError : when a file of the run is at fault
+    """
+    stage, simulate = given.run.stage_folder(MountedDampers.folder), given.config.simulate
+    return tuple(
+        Content(
+            name="-".join(filter(None, (given.run.config.stem, name))),
+            version=versions()["pzd"],
+            config=given.run.config.name,
+            control=given.run.control,
+            damper=axle.damper or damper_without_force(axle.table),
+            table=axle.table,
+            force_levels=given.config.table.force_levels,
+            car=simulate.car.car(),
+            tie_break=simulate.tie_break,
+            edited=tuple(f"{MountedDampers.folder}/{name}" for name in stage.edited),
+            marks=stage.manifest.marks if stage.manifest else (),
+            by_curve=axle.damper is None,
+        )
+        for name, axle in given.run.read(MountedDampers).named_axles
+    )
+
+
 def _check_fresh(given: Opened, remedy: str) -> None:
-    for kind in (Diagnosed, Table):
+    for kind in (Diagnosed, Table) if given.config.damper is None else (MountedDampers,):
         if given.run.stage_folder(kind.folder).manifest is None:
             raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {remedy} makes it")
     for stage, reason in stale_stages(given).items():

@@ -14,6 +14,7 @@ from pzd.artefacts import (
     Hypotheses,
     Identified,
     Knees,
+    MountedDampers,
     ParameterRow,
     Report,
     Rides,
@@ -22,6 +23,7 @@ from pzd.artefacts import (
     SummaryRow,
     Table,
 )
+from pzd.artefacts.mounted import NOTES
 from pzd.config import control_of, read_config, validated
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.pipeline.state_comparison import comparison_name, write_comparison
@@ -63,6 +65,8 @@ class RunSummary:
     """How well tested settings are predicted from their neighbours."""
     hypotheses: Hypotheses = field(default_factory=Hypotheses)
     """Which shape what is left has, where the verdict is `unexplained`."""
+    mounted: MountedDampers | None = None
+    """The dampers, where they are known without a rig."""
 
 
 COMPARISONS = "compare"
@@ -195,10 +199,23 @@ def write_runs_page(found: Sequence[RunSummary], warnings: Sequence[str]) -> Pat
         return write_comparison(run, COMPARISONS, name, write) / f"{name}.html"
 
 
+def _mounted_of(given: Opened) -> MountedDampers | None:
+    """Return the dampers of a run without a rig; None where its first stage has not run."""
+    there = (given.run.folder / MountedDampers.folder / NOTES).is_file()
+    return given.run.read(MountedDampers) if there else None
+
+
 def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
     """Add what the config says of the numbers: what is stale, and what the rides assume."""
+    if given.config.damper is not None:  # what the run of a rig left in the folder is none of this one
+        nothing = RunSummary(
+            found.folder, found.control, (), None, found.summary, found.comfort, found.page, found.marks
+        )
+        found = replace(nothing, mounted=_mounted_of(given))
     effects = found.diagnosis.effects if found.diagnosis else ()
-    with_voltage = all(row.voltage_V is not None for row in found.parameters)
+    with_voltage = (
+        found.mounted.controlled if found.mounted else all(row.voltage_V is not None for row in found.parameters)
+    )
     if not given.config.car:  # rides that an earlier config left in the folder are none of this run
         found = replace(found, summary=(), comfort=())
     lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()

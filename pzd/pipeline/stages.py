@@ -46,15 +46,22 @@ class Stage:
 def stages(config: RunConfig) -> tuple[Stage, ...]:
     """Return the stages of a config, first to last."""
     from pzd.diagnosis.stage import diagnose
+    from pzd.force_table.mounted import tabulate_mounted
     from pzd.force_table.stage import tabulate
     from pzd.identification.stage import identify
+    from pzd.report.mounted import report_mounted
     from pzd.report.stage import report
     from pzd.rig.stage import ingest, synthesise
     from pzd.simulate.config import SimulateConfig
-    from pzd.simulate.stage import simulate
+    from pzd.simulate.stage import simulate, simulate_mounted
 
+    not_simulated = {"simulate": SimulateConfig(), "rides": Rides()}
+    if config.rig is None:
+        mounted = (Stage("simulate", simulate_mounted), Stage(LAST, report_mounted))
+        on_curve = (Stage(LAST, report_mounted, not_simulated),)
+        return (Stage("table", tabulate_mounted), *(mounted if config.car else on_curve))
     ridden = (Stage("simulate", simulate), Stage(LAST, report))
-    not_ridden = (Stage(LAST, report, {"simulate": SimulateConfig(), "rides": Rides()}),)
+    not_ridden = (Stage(LAST, report, not_simulated),)
     return (
         Stage("synthesise", synthesise) if config.rig.virtual else Stage("ingest", ingest),
         Stage("identify", identify),

@@ -121,7 +121,7 @@ def _blocks(given: Opened, jobs: int) -> list[State]:
     identified = identify(config.identify, rig, jobs)
     first = diagnosed_state(
         State.of(name, rig, identified, setting, control),
-        rig, identified, setting, config.diagnose, config.identify, config.rig, control, jobs,
+        rig, identified, setting, config.diagnose, config.identify, config.measured_rig, control, jobs,
     )  # fmt: skip
     return [first, *(State.of(name, rig, identified, setting, control) for name, rig in blocks[1:])]
 
@@ -132,7 +132,7 @@ def _state(given: Opened, name: str, setting: str | None, jobs: int, *, diagnose
     if not diagnosed:
         return state
     return diagnosed_state(
-        state, rig, identified, setting, config.diagnose, config.identify, config.rig, given.run.control, jobs
+        state, rig, identified, setting, config.diagnose, config.identify, config.measured_rig, given.run.control, jobs
     )
 
 

@@ -36,8 +36,8 @@ class ReportContext:
 
     @property
     def controlled(self) -> bool:
-        """Whether a control signal was recorded; where none was, the page does not speak of one."""
-        return self.tests.controlled
+        """Whether there is a control signal; where none is, the page does not speak of one."""
+        return self.tests.controlled or any(row.voltage_V is not None for row in self.table.force)
 
     @property
     def ridden(self) -> bool:

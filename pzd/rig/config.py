@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pzd.quantities import CHANNELS, DAMPING, FRICTION, STIFFNESS, VOLTAGE, Control
+from pzd.quantities import CHANNELS, DAMPING, FRICTION, STIFFNESS, TIME, VOLTAGE, Control
 from pzd.rig.stand.config import VirtualEntry
 from pzd.schema.model import Frozen, all_keys
 
@@ -118,6 +118,32 @@ class FileSplit(Frozen):
         return self
 
 
+class Beside(Frozen):
+    """A second logger that recorded some of the quantities of the same tests, by a clock of its own."""
+
+    path: str = Field(min_length=1)
+    """Its file, relative to the folder of this config; `*` stands for what `*` matched in the path beside it. How it
+    is written is seen from the file."""
+    columns: dict[str, Header] = Field(default={})
+    """Quantity -> header in its file: `time`, and what is read of it."""
+    units: dict[str, Unit] = Field(default={})
+    """Quantity -> unit in its file, as beside it."""
+    same_clock: bool = False
+    """Whether both clocks count from one instant, or both are of dates."""
+    event: tuple[str, str] | None = None
+    """Headers of an event that both recorded, here and in the second file: its rising edges are the same instants."""
+    column: tuple[str, str] | None = None
+    """Headers of a signal that both recorded, here and in the second file: the clocks are set where they agree best."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if sum((self.same_clock, self.event is not None, self.column is not None)) != 1:
+            raise ValueError("say how the clocks go together, exactly one of same_clock, event, column")
+        if TIME.name not in self.columns or len(self.columns) < 2:
+            raise ValueError("columns: name time and what is read of this file, e.g. {time: t, force: Load}")
+        return self
+
+
 class FilesEntry(Frozen):
     """Measured files of one layout, and how to read them."""
 
@@ -166,6 +192,8 @@ class FilesEntry(Frozen):
     """Lines that begin with this character are left out."""
     encoding: str = "utf-8"
     """Encoding of the text."""
+    beside: Beside | None = None
+    """A second logger of the same tests, whose file holds some of the quantities."""
     source: str | None = None
     """Where the files can be had: shown when they are absent."""
 

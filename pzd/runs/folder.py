@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
+from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, MountedDampers, Report, Rides, Rig, Table
 from pzd.quantities import Control
 from pzd.runs.disk import (
     as_files_error,
@@ -36,7 +36,7 @@ from pzd.schema.validate import read_json, write_json
 
 log = logging.getLogger(__name__)
 
-Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefact)
+Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, MountedDampers, Rides, Report, Artefact)
 
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pzd.artefacts import Diagnosed, Rides, Table
+from pzd.artefacts import Diagnosed, MountedDampers, Rides, Table, damper_without_force
 from pzd.schema.csvfile import check_installed
 from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
@@ -65,6 +65,25 @@ def simulate(
     return _ridden(simulate, planned, setups, answered, with_voltage=with_voltage, jobs=jobs)
 
 
+def simulate_mounted(
+    simulate: SimulateConfig, mounted: MountedDampers, seed: int, folder: Path, jobs: int = 1
+) -> Rides:
+    """Ride every case of the config on dampers that are known without a rig.
+
+    Parameters
+    ----------
+    simulate : the config's block
+    mounted : the dampers, of one or of each axle
+    seed, folder, jobs : as `simulate`
+
+    Raises
+    ------
+    ConfigError, DataError : as `simulate_on_axles` does
+    """
+    axles = [(axle.damper, axle.table) for axle in mounted.axles]
+    return simulate_on_axles(simulate, axles, seed, folder, jobs)
+
+
 def simulate_on_axles(
     simulate: SimulateConfig, axles: Sequence[tuple[Damper | None, Table]], seed: int, folder: Path, jobs: int = 1
 ) -> Rides:
@@ -90,6 +109,8 @@ def simulate_on_axles(
     from pzd.simulate.study.tuning import Setup
 
     config, controlled, mounted = simulate, [], []
+    if config.histories == "parquet":
+        check_installed("simulate.histories")
     if any(damper is None for damper, _ in axles):
         fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
         config = simulate.model_copy(update={"fidelities": fidelities})
@@ -97,7 +118,7 @@ def simulate_on_axles(
         controlled.append(all(row.voltage_V is not None for row in table.force))
         checked_voltage(config, table)
         temperature = checked_temperature(config, table)
-        dynamic = dynamic_damper_of(damper or _never_asked(table), temperature, config.valve_response_s)
+        dynamic = dynamic_damper_of(damper or damper_without_force(table), temperature, config.valve_response_s)
         check_inertance(dynamic, config.car.car())
         mounted.append((grid_of(table, temperature), dynamic))
     if len(set(controlled)) > 1:
@@ -110,15 +131,6 @@ def simulate_on_axles(
     rear = mounted[1] if len(mounted) > 1 else None
     setup = Setup(config, profiles_of(config, seed, folder), *mounted[0], ends, rear)
     return _ridden(config, planned, {False: setup}, (), with_voltage=controlled[0], jobs=jobs)
-
-
-def _never_asked(table: Table) -> Damper:
-    """Return what the kernels want where only a table is ridden: they ask it for no force."""
-    from pzd.damper.model import PHYSICAL, BaseRow, Damper
-
-    row = BaseRow(T0_N=0.0, C_Ns_per_m=1.0, k_N_per_m=PHYSICAL["k_N_per_m"][1])
-    voltages = dict.fromkeys(row.voltage_V for row in table.force)
-    return Damper(base=tuple(row.model_copy(update={"voltage_V": voltage}) for voltage in voltages))
 
 
 def _ridden(

@@ -288,7 +288,9 @@ def test_a_file_that_is_no_test_of_a_damper_is_told_what_it_is(tmp_path: Path) -
     assert "accelerations of a ride, and no test of a damper: pzd rate rates them" in world_of(tmp_path, lines(ride))
     v = np.linspace(-1.0, 1.0, 21)
     curve = {"Velocity [m/s]": v, "Force [N]": 900.0 * v}
-    assert "a curve of force over velocity, and no recording over time" in world_of(tmp_path, lines(curve))
+    told = world_of(tmp_path, lines(curve))
+    assert "a curve of force over velocity, and no recording over time" in told
+    assert "take it by damper: {curve: " in told
     bands = {"Frequency [Hz]": np.geomspace(1.0, 80.0, 20), "a [m/s2]": np.full(20, 0.2)}
     assert "levels over frequency, as of third octaves" in world_of(tmp_path, lines(bands))
     telemetry = {"Time [s]": TIME, "Damper Pos FL [mm]": X, "Damper Pos FR [mm]": X, "Speed [km/h]": X}

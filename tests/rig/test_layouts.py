@@ -17,6 +17,7 @@ from written_files import FORCE, TIME, X, lines, run, write, wrong
 from pzd.artefacts import Rig
 from pzd.cli.app import status
 from pzd.config import load
+from pzd.export.formats import formats as exports
 from pzd.quantities import Control
 from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
@@ -312,9 +313,12 @@ def test_degrees_fahrenheit_are_reported_with_their_zero(tmp_path: Path) -> None
 # ---------------------------------------------------------------- the page
 
 
-def test_every_format_and_layout_is_in_the_page_of_the_configs(root: Path, tmp_path: Path) -> None:
+def test_every_format_read_or_written_and_every_layout_is_in_the_page_of_the_configs(
+    root: Path, tmp_path: Path
+) -> None:
     page = (root / "configs" / "README.md").read_text(encoding="utf-8")
     assert [name for name in formats() if f"| `{name}` |" not in page] == []
+    assert [name for name, one in exports().items() if f"| `{name}` | {one.meaning}" not in page] == []
     shown = {name: layout.about for name, layout in all_layouts(tmp_path).items()}
     assert [name for name, about in shown.items() if f"| `{name}` | {about} |" not in page] == []
 

@@ -34,6 +34,8 @@ class Format:
     """
     needs: str | None = None
     """The library that writes it, an extra; None where pzd itself needs it anyway."""
+    dynamics: bool = False
+    """Whether it holds more of the damper than its table, which is all that there is of a measured curve."""
     ending: str | None = None
     """Ending of the files' names where their number depends on the damper; None where it does not."""
 

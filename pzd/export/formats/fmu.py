@@ -66,4 +66,4 @@ def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     return written.getvalue()
 
 
-FORMATS = (Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files),)
+FORMATS = (Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files, dynamics=True),)

@@ -93,7 +93,8 @@ def _parameters(content: Content) -> dict[str, Any]:
         name: {content.control.renamed(key): np.atleast_1d(value) for key, value in given.items()}
         for name, given in content.damper.effects.items()
     }
-    return {"base": numbers["base"], "effects": effects or np.zeros((0, 0)), **numbers.get("reference", {})}
+    base = numbers.get("base", np.zeros((0, 0)))  # of a measured curve there is none
+    return {"base": base, "effects": effects or np.zeros((0, 0)), **numbers.get("reference", {})}
 
 
 FORMATS = (Format("mat", "breakpoints and tables for Simulink and Octave", files),)

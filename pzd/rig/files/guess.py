@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -218,7 +217,7 @@ def _keys(
     if pattern:
         yield _pattern_key(pattern)
     yield from _events(files[0])
-    if not missing and any(_turned(file, columns) for file in files):
+    if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
@@ -297,7 +296,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield f'separator: "{dialect.separator}"'
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
-    if dialect.decimal == "," and any("," in cell for cell in dialect.first):
+    if dialect.decimal == ",":
         yield "decimal: ','"
     if dialect.units_row:
         yield "units_row: true"
@@ -318,11 +317,24 @@ def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
             yield f"  {quantity.name}: {written(unit)}"
 
 
+def _recorded(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
+    """Whether force or displacement is in units of the recorder, so that its sign comes with the calibration."""
+    heads = [(columns[quantity], quantity) for quantity in (DISPLACEMENT, FORCE)]
+    units = (
+        below.strip("[]() ") if (below := file.unit_below(head)) and below.strip("[]() ") else in_header(head, quantity)
+        for head, quantity in heads
+    )
+    return any(unit in _RECORDER for unit in units)
+
+
 def _lacking(column: str, below: str | None, quantity: Quantity) -> str:
     """Say what a column lacks to be read."""
     recorded = below.strip("[]() ") if below and below.strip("[]() ") else in_header(column, quantity)
     if recorded in _RECORDER:
-        return f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}"
+        return (
+            f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}; with its zero "
+            f"-200 {quantity.unit}/{recorded} about 2.5 {recorded}, or about the mean of the first 10"
+        )
     if factor_in(column):
         return f"names a factor: what one recorded unit stands for, e.g. {quantity.unit}"
     return f"names no unit, e.g. {quantity.unit}"
@@ -361,13 +373,7 @@ def _events(file: SniffedFile) -> Iterator[str]:
 
 
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
-    dialect = file.dialect
-    options: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
-    if dialect.headless:
-        options["header"] = dialect.header
-    if file.form == TEXT:
-        options |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
-    return FilesEntry(path=str(file.path), split=split, **options)
+    return file.dialect.entry(file.path, file.form, split)
 
 
 def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
@@ -477,9 +483,9 @@ def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
         raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
     lacking = [q for q in (DISPLACEMENT, FORCE) if q not in columns]
     if any(not _candidates(file, columns, q) for q in lacking):
-        raise DataError(
-            f"{at(path, line)}: without {' and '.join(q.name for q in lacking)} no damper: this file has {here}"
-        )
+        what = f"without {' and '.join(q.name for q in lacking)} no damper: this file has {here}"
+        telemetry = TIME in columns and FORCE in lacking and not _candidates(file, columns, FORCE)
+        raise DataError(f"{at(path, line)}: {what}{', as telemetry of a car has' if telemetry else ''}")
     return file
 
 
@@ -492,10 +498,13 @@ _FREQUENCY = re.compile(r"freq|^f ?[\[(]|hertz|terz|third|octave|\bHz\b", re.IGN
 def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str | None:
     """Say what a file is that holds no recording of force and displacement, and what reads it; None where it may."""
     heads = [head for head in file.dialect.header if head.strip()]
-    if TIME not in columns and _FREQUENCY.search(heads[0]) and FORCE not in columns:
+    if TIME not in columns and _FREQUENCY.search(heads[0]) and columns.get(FORCE, heads[0]) == heads[0]:
         return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
     if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
-        return "a curve of force over velocity, and no recording over time: a test needs time, displacement and force"
+        return (
+            "a curve of force over velocity, and no recording over time: in place of a rig take it by damper: "
+            f"{{curve: {file.path.as_posix()}, sign: 1}}, or sign: -1 where positive velocities compress"
+        )
     accelerations = [
         head for head in heads if unit_of(_accelerated(head), file.unit_below(head), ACCELERATION) is not None
     ]

@@ -303,8 +303,9 @@ def read(
     data_faults: list[str] = []
     for file in files:
         try:
-            layout_of[file.path] = described[file.number]
-            tests += _read_file(file.path, described[file.number])
+            layout, found = _read_file(file.path, described[file.number], folder)
+            layout_of[file.path] = layout
+            tests += found
         except ConfigError as error:
             config_faults += error.messages
         except DataError as error:
@@ -372,10 +373,18 @@ def _label(test: RawRecord) -> tuple[str | None, tuple[float, ...]]:
     return test.setting, tuple(-273.15 if values is None else float(np.median(values)) for values in channels)
 
 
-def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]]:
-    """Read the tests of one file, with displacement and force of the damper alone in each."""
+def _read_file(path: Path, layout: Layout, folder: Path) -> tuple[Layout, list[tuple[RawRecord, DamperAlone]]]:
+    """Read the tests of one file, with displacement and force of the damper alone in each, and the layout they have."""
     values, setting = layout.values(path)
-    return _tests_of(read_sheet(path, layout.entry, layout.wanted(), layout.place), layout, values, setting)
+    beside = layout.entry.beside
+    if beside is None:
+        sheet = read_sheet(path, layout.entry, layout.wanted(), layout.place)
+    else:
+        from pzd.rig.files.two_loggers import with_other_logger
+
+        placed = beside.model_copy(update={"path": str(folder / beside.path)})
+        sheet, layout = with_other_logger(path, layout, placed)
+    return layout, _tests_of(sheet, layout, values, setting)
 
 
 def _tests_of(sheet: Sheet, layout: Layout, values: Values, setting: str | None) -> list[tuple[RawRecord, DamperAlone]]:

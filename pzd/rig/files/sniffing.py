@@ -1,6 +1,6 @@
 """Guesses about a file of unknown layout: its dialect, the quantity in each column, the values in its name.
 
-Only for the guess of a config: a run reads files by its config.
+Only for the guess of a config, and for the few rows of a measured curve: a run reads records by its config.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from pzd.quantities import (
     Control,
     Quantity,
 )
-from pzd.rig.config import FilesEntry
+from pzd.rig.config import FilesEntry, FileSplit
 from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
@@ -84,7 +85,7 @@ def control_of(headers: Sequence[str]) -> Control:
         control
         for control, pattern in CONTROLS.items()
         for header in headers
-        if (re.search(pattern, _bare(header)) and _quantity_of(header, None, Control()) not in (FORCE, DISPLACEMENT))
+        if (re.search(pattern, _bare(header)) and quantity_of(header, None, Control()) not in (FORCE, DISPLACEMENT))
         or _by_unit(header, None, control) is VOLTAGE
     ]
     return next(iter(shown), Control())
@@ -98,7 +99,7 @@ def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Contr
     found: dict[Quantity, tuple[int, str]] = {}
     for index, header in enumerate(headers):
         below = units[index] if units else None
-        quantity = _quantity_of(header, below, control)
+        quantity = quantity_of(header, below, control)
         if quantity is None:
             continue
         canonical = is_canonical(header, quantity, control)
@@ -130,8 +131,15 @@ def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
     return unit
 
 
-def _quantity_of(header: str, below: str | None, control: Control) -> Quantity | None:
-    """Return the quantity in a header; of two (Druckkraft, load cell voltage) the mechanical one."""
+def quantity_of(header: str, below: str | None, control: Control) -> Quantity | None:
+    """Return the quantity in a header; of two (Druckkraft, load cell voltage) the mechanical one.
+
+    Parameters
+    ----------
+    header : of the column
+    below : of the row of units, where there is one
+    control : the control signal
+    """
     for quantity in CHANNELS:
         if is_canonical(header, quantity, control):
             return quantity
@@ -220,7 +228,7 @@ def setting_of(pattern: str | None, path: Path) -> str | None:
 
 MOST_LINES = 400
 """Lines from the top that are looked at: a preamble is shorter, and a table shows itself in fewer."""
-_CELL_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_CELL_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _CLOCK = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d{2}(:\d{2}.*)?|\d{4}-\d{2}-\d{2}T.*")
 _UNIT = re.compile(r"[\[(]?\s*[A-Za-zµ°%/²³^*.0-9-]{1,8}\s*[\])]?|-")
 
@@ -248,6 +256,22 @@ class Dialect:
     def header_line(self) -> int:
         """Line of the header in the file."""
         return self.skip + 1
+
+    def entry(self, path: Path, form: str, split: FileSplit | None = None) -> FilesEntry:
+        """Return the entry of `rig.files` that reads a file of this dialect.
+
+        Parameters
+        ----------
+        path : the file
+        form : name of its format
+        split : how it is cut into tests
+        """
+        options: dict[str, Any] = {"skip": self.skip, "units_row": self.units_row}
+        if self.headless:
+            options["header"] = self.header
+        if form == TEXT:
+            options |= {"separator": self.separator, "decimal": self.decimal, "encoding": self.encoding}
+        return FilesEntry(path=str(path), split=split, **options)
 
 
 def described(path: Path) -> tuple[Dialect, str]:
@@ -380,7 +404,7 @@ def _table(
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
-    return (len(alike), sum(numbers[n] for n in alike[:1])), found
+    return (len(alike), sum(numbers[n] for n in alike)), found
 
 
 def _headless(
@@ -393,7 +417,7 @@ def _headless(
         return None
     header = tuple(f"column{n + 1}" for n in range(width))
     found = Dialect(header, None, tuple(rows[0]), encoding, separator, decimal, headless=True)
-    return (len(alike), numbers[0]), found
+    return (len(alike), sum(numbers[n] for n in alike)), found
 
 
 def _unquoted(cell: str) -> str:

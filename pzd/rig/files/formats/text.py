@@ -107,6 +107,8 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     for column in [i for i in rest if wanted.as_numbers(header[i])]:
         more, bad = table.numbers([column])
         values, faults = values | more, faults | bad
+    sparse = {i: cells for i in faults if header[i] in wanted.held and (cells := table.sparse(i)) is not None}
+    values, faults = values | sparse, {i: told for i, told in faults.items() if i not in sparse}
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
     steps = tuple(_steps(entry, header, wanted, numbers, trailing))
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
@@ -320,6 +322,21 @@ class _Table:
             for column, rows in infinite.items()
         }
 
+    def sparse(self, column: int) -> Array | None:
+        """Parse a column (rows,) in which most cells say in a word that there is no value, which is then NaN.
+
+        Returns
+        -------
+        None where fewer than half say so, or a cell is neither such a word nor a number
+        """
+        cells = ["" if cell.lower() in _NO_VALUE else cell for cell in self._cells(column)]
+        if 2 * cells.count("") < len(cells):
+            return None
+        try:
+            return np.array([_number(cell, self.decimal) for cell in cells])
+        except ValueError:
+            return None
+
     def texts(self, column: int) -> list[str]:
         """Return the cells of one column, stripped; empty where a line ends before it."""
         return list(self._cells(column))
@@ -383,12 +400,20 @@ class _Table:
         return listed_faults(self.path, self.header[column], places, count)
 
 
+_NO_VALUE = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"})
+"""What loggers write where a slow channel has no sample."""
+_FORTRAN = re.compile(r"[+-]?[\d.,]+[dD][+-]?\d+")
+"""A number in double precision as Fortran writes it."""
+
+
 def _number(cell: str, decimal: str) -> float:
     """Return the number in a cell, NaN where it is empty; infinities and NaN are no numbers."""
     if not cell:
         return float("nan")
     if "_" in cell or (decimal == "," and "." in cell):
         raise ValueError(cell)
+    if _FORTRAN.fullmatch(cell):
+        cell = cell.replace("D", "E").replace("d", "e")
     value = float(cell.replace(",", ".") if decimal == "," else cell)
     if not np.isfinite(value):
         raise ValueError(cell)
