@@ -14,6 +14,7 @@ from pzd.record import Array
 from pzd.signals.cycles import Cycles
 from pzd.signals.measures import usual_step
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.splines import even_cubic
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors: noise does so once in 10^7."""
@@ -96,17 +97,14 @@ def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
     """Return the average cycle and its derivatives at the samples inside the run."""
-    from scipy.interpolate import CubicSpline
-
     folded = run.fold(time, displacement)
     points = folded.shape[1]
     spectrum = np.where(significant_harmonics(folded), np.fft.rfft(folded.mean(axis=0)), 0.0)
     rate = 2j * np.pi * np.arange(spectrum.size) * run.frequency
     fine = 8 * points
     cycle = np.stack([np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)], axis=1)
-    grid = np.linspace(0.0, 1.0, fine + 1)
     phase = run.phase(time[run.inside(time)])
-    wrapped = CubicSpline(grid, np.concatenate((cycle, cycle[:1])), bc_type="periodic")(phase)
+    wrapped = even_cubic(cycle, periodic=True)(fine * phase)
     return Kinematics(*np.ascontiguousarray(wrapped.T))
 
 

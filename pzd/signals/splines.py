@@ -1,0 +1,77 @@
+"""Interpolating cubic spline through even samples, several times as fast to set up as one through any samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pzd.record import Array
+
+_ROOT = float(np.sqrt(3.0)) - 2.0
+"""Root of z^2 + 4 z + 1: what an end of the samples adds to the coefficients dies away with its powers."""
+_FEWEST = 4
+"""Fewest samples that determine a cubic."""
+_NEAR = 32
+"""Coefficients that an end of the samples changes: the power is 5e-19 then."""
+
+
+def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Array]:
+    """Return the cubic spline through even samples as a function of the position among them.
+
+    Equation: s(j) = (c_{j-1} + 4 c_j + c_{j+1})/6 at sample j; where the samples do not repeat, the third derivative is
+    continuous at the last but one of either end (not-a-knot)
+    Source: Unser, Aldroubi and Eden 1993, IEEE Trans. Signal Process. 41, 821-848
+
+    Parameters
+    ----------
+    values : (n,) or (n, p) samples; where they repeat those of one period, the first one not given again
+    periodic : whether they repeat
+
+    Returns
+    -------
+    function that gives the (m,) or (m, p) values at (m,) positions, counted in samples from the first one; beyond the
+    ends of what does not repeat it continues the outermost cubics
+
+    Examples
+    --------
+    >>> even_cubic(np.arange(6.0) ** 3)(np.array([2.5, 6.0])).round(9).tolist()
+    [15.625, 216.0]
+    """
+    count = len(values)
+    if count < _FEWEST and not periodic:
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(np.arange(count), values)  # a line or a parabola
+    from scipy.ndimage import spline_filter1d
+
+    c = spline_filter1d(values, 3, axis=0, mode="grid-wrap" if periodic else "mirror")
+    c = c[np.arange(-1, count + 3) % count] if periodic else _not_a_knot(np.concatenate([c[1:2], c, c[-2:-1]]))
+
+    def at(position: Array) -> Array:
+        inside = np.mod(position, count) if periodic else position
+        first = np.floor(inside) if periodic else np.clip(np.floor(inside), 0, count - 2)
+        share = (inside - first).reshape(-1, *([1] * (values.ndim - 1)))
+        rest, k = 1.0 - share, first.astype(np.intp)
+        found = rest**3 * c[k]
+        found += (4.0 - 3.0 * share**2 * (1.0 + rest)) * c[k + 1]
+        found += (4.0 - 3.0 * rest**2 * (1.0 + share)) * c[k + 2]
+        found += share**3 * c[k + 3]
+        return np.asarray(found / 6.0)
+
+    return at
+
+
+def _not_a_knot(c: Array) -> Array:
+    """Return coefficients (n + 2,) or (n + 2, p) of the same samples without a knot at the last but one of either end.
+
+    What may be added to them without a change at a sample is a z^j + b z^(n + 1 - j).
+    """
+    size, near = (1.0 - _ROOT) ** 4, min(len(c), _NEAR)
+    mode = _ROOT ** np.arange(near).reshape(-1, *([1] * (c.ndim - 1)))
+    left, right = np.diff(c[:5], 4, axis=0), np.diff(c[-5:], 4, axis=0)
+    coupled = _ROOT ** (len(c) - 5)
+    share = 1.0 / (size * (1.0 - coupled**2))
+    c[:near] -= share * (left - coupled * right) * mode
+    c[-near:] -= share * (right - coupled * left) * mode[::-1]
+    return c
