@@ -20,7 +20,7 @@ from pzd.quantities import VOLTAGE
 
 
 def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
-    """Describe each key, and let keys of the control signal bear the name of any control: `current_A`, `rebound_clicks`.
+    """Describe each key, and let those of the control signal bear any control's name: `current_A`, `rebound_clicks`.
 
     Parameters
     ----------

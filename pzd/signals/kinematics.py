@@ -14,7 +14,7 @@ from pzd.record import Array
 from pzd.signals.cycles import Cycles
 from pzd.signals.measures import usual_step
 from pzd.signals.smoothing import HIGHEST, low_pass
-from pzd.signals.splines import even_cubic
+from pzd.signals.splines import even_cubic, even_derivatives, is_even
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors: noise does so once in 10^7."""
@@ -110,12 +110,16 @@ def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
 
 def _smoothed_motion(time: Array, displacement: Array, highest: float) -> Kinematics:
     """Smooth the displacement by cross-validation, with a corner of at most `highest` [Hz]."""
-    from scipy.interpolate import CubicSpline
-
     steps = np.diff(time)
     step = max(usual_step(time), float(time[-1] - time[0]) / (4.0 * time.size))
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)
-    smooth = CubicSpline(grid, low_pass(values, min(2.0 * np.pi * highest * step, HIGHEST)))
-    return Kinematics(smooth(time), smooth(time, 1), smooth(time, 2))
+    smooth = low_pass(values, min(2.0 * np.pi * highest * step, HIGHEST))
+    if regular and is_even(time):
+        speed, acceleration = even_derivatives(smooth)
+        return Kinematics(smooth, speed / step, acceleration / step**2)
+    from scipy.interpolate import CubicSpline
+
+    course = CubicSpline(grid, smooth)
+    return Kinematics(course(time), course(time, 1), course(time, 2))

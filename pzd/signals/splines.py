@@ -1,4 +1,4 @@
-"""Interpolating cubic spline through even samples, several times as fast to set up as one through any samples."""
+"""Interpolating cubic splines: through even samples ten times as fast to set up as through any others."""
 
 from __future__ import annotations
 
@@ -10,10 +10,35 @@ from pzd.record import Array
 
 _ROOT = float(np.sqrt(3.0)) - 2.0
 """Root of z^2 + 4 z + 1: what an end of the samples adds to the coefficients dies away with its powers."""
+_EVEN = 1e-6
+"""Largest distance of a sample to an even clock [samples]: less is rounding of the recorded times."""
 _FEWEST = 4
 """Fewest samples that determine a cubic."""
 _NEAR = 32
 """Coefficients that an end of the samples changes: the power is 5e-19 then."""
+
+
+def cubic(time: Array, values: Array) -> Callable[[Array], Array]:
+    """Return the cubic spline through samples (n,) or (n, p) as a function of time, not-a-knot at either end.
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing [s]
+    values : (n,) or (n, p)
+    """
+    if not is_even(time):
+        from scipy.interpolate import CubicSpline
+
+        uneven: Callable[[Array], Array] = CubicSpline(time, values)
+        return uneven
+    course, step = even_cubic(values), (time[-1] - time[0]) / (time.size - 1)
+    return lambda moments: course((moments - time[0]) / step)
+
+
+def is_even(time: Array) -> bool:
+    """Whether samples (n,), n >= 2, lie on an even clock."""
+    clock = np.linspace(time[0], time[-1], time.size)
+    return bool(np.max(np.abs(time - clock)) <= _EVEN * (clock[1] - clock[0]))
 
 
 def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Array]:
@@ -43,10 +68,7 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
         from scipy.interpolate import CubicSpline
 
         return CubicSpline(np.arange(count), values)  # a line or a parabola
-    from scipy.ndimage import spline_filter1d
-
-    c = spline_filter1d(values, 3, axis=0, mode="grid-wrap" if periodic else "mirror")
-    c = c[np.arange(-1, count + 3) % count] if periodic else _not_a_knot(np.concatenate([c[1:2], c, c[-2:-1]]))
+    c = _coefficients(values, periodic=periodic)
 
     def at(position: Array) -> Array:
         inside = np.mod(position, count) if periodic else position
@@ -60,6 +82,24 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
         return np.asarray(found / 6.0)
 
     return at
+
+
+def even_derivatives(values: Array) -> tuple[Array, Array]:
+    """Return first and second derivative of the cubic spline through even samples (n,), n >= 4, at the samples.
+
+    Equation: s'(j) = (c_{j+1} - c_{j-1})/2, s''(j) = c_{j-1} - 2 c_j + c_{j+1}, per sample; see `even_cubic`
+    """
+    c = _coefficients(values, periodic=False)
+    return np.asarray(0.5 * (c[2:] - c[:-2])), np.asarray(c[:-2] - 2.0 * c[1:-1] + c[2:])
+
+
+def _coefficients(values: Array, *, periodic: bool) -> Array:
+    """Return the coefficients c_{-1}, c_0, ... to c_n, or to c_{n+2} of what repeats."""
+    from scipy.ndimage import spline_filter1d
+
+    count = len(values)
+    c = spline_filter1d(values, 3, axis=0, mode="grid-wrap" if periodic else "mirror")
+    return c[np.arange(-1, count + 3) % count] if periodic else _not_a_knot(np.concatenate([c[1:2], c, c[-2:-1]]))
 
 
 def _not_a_knot(c: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pzd.signals.splines import even_cubic
+from pzd.signals.splines import cubic, even_cubic, even_derivatives
 
 ROUNDING = 1e-13
 """Of the largest value."""
@@ -48,3 +48,19 @@ def test_it_converges_with_the_fourth_power_of_the_step() -> None:
         errors.append(np.max(np.abs(found - np.sin(2.0 * np.pi * between / samples))))
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert order == pytest.approx([4.0, 4.0], abs=0.1)
+
+
+@pytest.mark.parametrize("samples", [4, 5, 300])
+def test_its_derivatives_at_the_samples_are_those_of_the_spline(samples: int, rng: np.random.Generator) -> None:
+    values, at = rng.standard_normal(samples), np.arange(samples)
+    expected = CubicSpline(at, values)
+    for order, found in enumerate(even_derivatives(values), start=1):
+        assert found == pytest.approx(expected(at, order), abs=ROUNDING * np.max(np.abs(expected(at, order))))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_samples_that_are_not_even_are_taken_where_they_lie(jitter: float, rng: np.random.Generator) -> None:
+    time = 7.0 + 1e-3 * (np.arange(200) + jitter * rng.uniform(-1.0, 1.0, 200))
+    values, at = rng.standard_normal(200), rng.uniform(time[0], time[-1], 50)
+    expected = CubicSpline(time, values)(at)
+    assert cubic(time, values)(at) == pytest.approx(expected, abs=1e-9)

@@ -28,7 +28,7 @@ from pzd.signals.lack_of_fit import fit_smooth_residual
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, PureError, pure_error
 from pzd.signals.nuisance import NuisanceConfig
-from pzd.signals.splines import even_cubic
+from pzd.signals.splines import cubic, even_cubic
 
 # --- Nuisances
 
@@ -199,16 +199,12 @@ class WeightedRecord:
 
     def _course(self, simulated: Array) -> Callable[[Array], Array]:
         """Return values (m,) or (m, p) along the motion as a function of moments [s], by a cubic between samples."""
-        begin, time, steps = self._begin, self.motion.time[self._begin :], self.steps
-        if steps.size > 1:
-            from scipy.interpolate import CubicSpline
-
-            uneven = CubicSpline(time, simulated)
-            return lambda moments: np.asarray(uneven(np.clip(moments, time[0], time[-1])))
-        course = even_cubic(simulated[begin:], periodic=begin > 0)
+        begin, time = self._begin, self.motion.time[self._begin :]
         if begin > 0:
-            return lambda moments: course((moments - time[0]) / steps[0])
-        return lambda moments: course((np.clip(moments, time[0], time[-1]) - time[0]) / steps[0])
+            cycle, step = even_cubic(simulated[begin:], periodic=True), self.steps[0]
+            return lambda moments: cycle((moments - time[0]) / step)
+        course = cubic(time, simulated)
+        return lambda moments: course(np.clip(moments, time[0], time[-1]))
 
     def delayed(self, shown: Array) -> Callable[[float], Array]:
         """Return what a channel shows along the motion, (m,) or (m, p), at the compared samples by a delay [s]."""
