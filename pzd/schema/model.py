@@ -12,6 +12,7 @@ import textwrap
 import types
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -28,10 +29,10 @@ def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
     model : the block
     """
     properties: dict[str, Any] = schema.get("properties", {})
-    for one in model.__mro__:
-        if issubclass(one, Frozen):
-            for name, text in _field_docstrings(one).items():
-                properties.get(name, {}).setdefault("description", text)
+    for name, body in properties.items():
+        declared_in = next(one for one in model.__mro__ if name in one.__dict__.get("__annotations__", {}))
+        if text := _field_docstrings(declared_in).get(name):
+            body.setdefault("description", text)
     others = "|".join(map(re.escape, properties))
     for name, body in properties.items():
         before, named, after = name.partition(VOLTAGE.name)
@@ -42,7 +43,8 @@ def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
             schema.setdefault("patternProperties", {})[pattern] = copy.deepcopy(body)
 
 
-def _field_docstrings(block: type[BaseModel]) -> dict[str, str]:
+@cache
+def _field_docstrings(block: type) -> dict[str, str]:
     """Return the docstring under each field of a block that has one.
 
     Pydantic would read the sources of all blocks whenever they are imported, which takes a third of that time.

@@ -55,8 +55,8 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
 
     Returns
     -------
-    function that gives the (m,) or (m, p) values at (m,) positions, counted in samples from the first one; beyond the
-    ends of what does not repeat it continues the outermost cubics
+    function that gives the values (...) or (..., p) at positions (...), counted in samples from the first one; beyond
+    the ends of what does not repeat it continues the outermost cubics
 
     Examples
     --------
@@ -73,7 +73,7 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
     def at(position: Array) -> Array:
         inside = np.mod(position, count) if periodic else position
         first = np.floor(inside) if periodic else np.clip(np.floor(inside), 0, count - 2)
-        share = (inside - first).reshape(-1, *([1] * (values.ndim - 1)))
+        share = np.expand_dims(inside - first, tuple(range(first.ndim, first.ndim + values.ndim - 1)))
         rest, k = 1.0 - share, first.astype(np.intp)
         found = rest**3 * c[k]
         found += (4.0 - 3.0 * share**2 * (1.0 + rest)) * c[k + 1]

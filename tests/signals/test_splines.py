@@ -18,7 +18,7 @@ def test_what_does_not_repeat_has_no_knot_beside_either_end(
     samples: int, channels: tuple[int, ...], rng: np.random.Generator
 ) -> None:
     values = rng.standard_normal((samples, *channels))
-    position = np.concatenate([np.arange(samples), rng.uniform(-1.0, samples, 300)])
+    position = np.concatenate([np.arange(samples), rng.uniform(-1.0, samples, 2 * samples)]).reshape(3, samples)
     expected = CubicSpline(np.arange(samples), values)(position)
     found = even_cubic(values)(position)
     assert found.shape == expected.shape
