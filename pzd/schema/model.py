@@ -30,7 +30,7 @@ def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
     """
     properties: dict[str, Any] = schema.get("properties", {})
     for name, body in properties.items():
-        declared_in = next(one for one in model.__mro__ if name in one.__dict__.get("__annotations__", {}))
+        declared_in = next(one for one in model.__mro__ if name in inspect.get_annotations(one))
         if text := _field_docstrings(declared_in).get(name):
             body.setdefault("description", text)
     others = "|".join(map(re.escape, properties))
