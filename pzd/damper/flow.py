@@ -82,13 +82,15 @@ def smooth_rise(w: float, p: Row, side: float) -> float:
 @compiled
 def smooth_force(w: float, p: Row, side: float) -> float:
     """Compute |F| [N] at a flow speed w >= 0 [m/s], the relief valve shut."""
-    return smooth_force_of(viscous_force(w, p, side), p, side)
+    friction = kernels.yield_force(w, p[T0] * kernels.direction_factor(side, p), p)
+    return friction + viscous_force(w, p, side) + kernels.extra_force(w, p)
 
 
 @compiled
 def smooth_slope(w: float, p: Row, side: float) -> float:
     """Compute the slope [N s/m] of `smooth_force`; infinite at w = 0 where the fluid thins."""
-    return smooth_rise(w, p, side) * kernels.viscous_slope(w, damping(p, side), p)
+    friction = kernels.yield_slope(w, p[T0] * kernels.direction_factor(side, p), p)
+    return friction + kernels.viscous_slope(w, damping(p, side), p) + kernels.extra_slope(w, p)
 
 
 @compiled

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array, Record, Rows
+from pzd.signals.splines import even_cubic
 
 VOLTAGE_STEP = 0.1
 """Change of the voltage between two samples that counts as a step, as a share of its range in the record."""
@@ -56,15 +57,13 @@ class Motion:
         -------
         the motion, and (n,) indices of the samples of this one in it
         """
-        from scipy.interpolate import CubicSpline
-
         samples = np.arange(self.time.size)
         places: Rows = np.concatenate([[0], np.cumsum(parts)])
         if places[-1] == samples[-1]:
             return self, samples
         fine = np.interp(np.arange(places[-1] + 1), places, samples)
         smooth = (self.displacement, self.velocity, self.acceleration)
-        displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
+        displacement, velocity, acceleration = (even_cubic(channel)(fine) for channel in smooth)
         conditions = (None if c is None else np.interp(fine, samples, c) for c in (self.voltage, self.temperature))
         time = np.interp(fine, samples, self.time)
         return type(self)(time, displacement, velocity, acceleration, *conditions), places

@@ -28,6 +28,7 @@ from pzd.signals.measures import resolution
 from pzd.signals.noise import neighbouring_harmonics, pure_error
 from pzd.signals.segmentation import separate_tests
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
+from pzd.signals.splines import even_cubic
 
 Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
@@ -251,16 +252,13 @@ class AverageCycle:
 
     def motion(self, harmonics: NDArray[np.complex128], finer: int = POINTS_OF_CYCLE) -> Callable[[Array], Motion]:
         """Return displacement, velocity and acceleration of some harmonics (H + 1,) as a function of time."""
-        from scipy.interpolate import CubicSpline
-
         rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
         fine = finer * self.points
         values = np.fft.irfft(harmonics * rate ** np.arange(3)[:, None], fine) * fine
-        values = np.concatenate([values, values[:, :1]], axis=1)
-        cycle = CubicSpline(np.arange(fine + 1) / fine, values, axis=1, bc_type="periodic")
+        cycle = even_cubic(values.T, periodic=True)
 
         def at(time: Array) -> Motion:
-            x, v, a = np.ascontiguousarray(cycle(self.run.phase(time)))
+            x, v, a = np.ascontiguousarray(cycle(fine * self.run.phase(time)).T)
             return x, v, a
 
         return at

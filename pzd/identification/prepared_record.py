@@ -22,6 +22,7 @@ from pzd.signals.kinematics import kinematics
 from pzd.signals.measures import REVERSAL_SHARE, reversals
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 from pzd.signals.period import moving_range
+from pzd.signals.splines import even_cubic
 
 # --- Preparation ---
 
@@ -82,13 +83,10 @@ class PreparedRecord:
 
 def prepare(record: Record) -> PreparedRecord:
     """Prepare a record for a fit, its warm-up and the rest after the motion not counted."""
-    from scipy.interpolate import CubicSpline
-
     time, factor, positions = _fine_time(record)
-    clock = record.time if positions is not None else np.linspace(record.time[0], record.time[-1], record.time.size)
     return PreparedRecord(
         record.name,
-        CubicSpline(clock, _clean_displacement(record))(time),
+        _on_fine_grid(_clean_displacement(record), record, time, even=positions is None),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
@@ -101,6 +99,15 @@ def prepare(record: Record) -> PreparedRecord:
 def _clean_displacement(record: Record) -> Array:
     """Return the displacement (n,) without its noise, which a stiff oil spring would turn into force [m]."""
     return kinematics(record.time, record.displacement, cycles_of(record)).displacement
+
+
+def _on_fine_grid(displacement: Array, record: Record, time: Array, *, even: bool) -> Array:
+    """Return a displacement (n,) at the (m,) moments of the fine grid, by a cubic spline through the samples [m]."""
+    if even:
+        return even_cubic(displacement)(np.linspace(0.0, displacement.size - 1, time.size))
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(record.time, displacement)(time))
 
 
 def in_motion(record: Record) -> NDArray[np.bool_]:

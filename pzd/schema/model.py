@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import difflib
+import inspect
+import itertools
 import re
+import textwrap
 import types
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -16,7 +21,7 @@ from pzd.quantities import VOLTAGE
 
 
 def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
-    """Let keys of the control signal bear the name of any control: `current_A` and `rebound_clicks` beside `voltage_V`.
+    """Describe each key, and let those of the control signal bear any control's name: `current_A`, `rebound_clicks`.
 
     Parameters
     ----------
@@ -24,6 +29,10 @@ def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
     model : the block
     """
     properties: dict[str, Any] = schema.get("properties", {})
+    for name, body in properties.items():
+        declared_in = next(one for one in model.__mro__ if name in inspect.get_annotations(one))
+        if text := _field_docstrings(declared_in).get(name):
+            body.setdefault("description", text)
     others = "|".join(map(re.escape, properties))
     for name, body in properties.items():
         before, named, after = name.partition(VOLTAGE.name)
@@ -32,6 +41,22 @@ def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
             after = after.removesuffix(unit) + (r"_\w+" if after.endswith(unit) else "")
             pattern = rf"^(?!(?:{others})$){before}[A-Za-z]\w*{after}$"
             schema.setdefault("patternProperties", {})[pattern] = copy.deepcopy(body)
+
+
+@cache
+def _field_docstrings(block: type) -> dict[str, str]:
+    """Return the docstring under each field of a block that has one.
+
+    Pydantic would read the sources of all blocks whenever they are imported, which takes a third of that time.
+    """
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(block))).body
+    lines = body.body if isinstance(body, ast.ClassDef) else []
+    return {
+        field.target.id: inspect.cleandoc(below.value.value)
+        for field, below in itertools.pairwise(lines)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str)
+    }
 
 
 class Frozen(BaseModel):
@@ -43,7 +68,6 @@ class Frozen(BaseModel):
         strict=True,
         allow_inf_nan=False,
         json_schema_extra=for_editors,
-        use_attribute_docstrings=True,
     )
 
     former_keys: ClassVar[Mapping[str, str]] = {}

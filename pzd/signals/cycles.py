@@ -8,7 +8,6 @@ shift between cycles, the edges of the run point by point, and the test of what 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -20,6 +19,7 @@ from pzd.signals.harmonics import MAINS
 from pzd.signals.measures import usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.splines import cubic
 
 FITTED_POINTS = 1000
 """Fewest points of a cycle in the fit of the period, as far as there are samples."""
@@ -87,7 +87,7 @@ class Cycles:
         # A spline forgets in a few samples: eight beyond the run are as good as all, and cheaper.
         reach = 8 * (time[1] - time[0])
         near = (time >= instants[0, 0] - reach) & (time <= instants[-1, -1] + reach)
-        return _cubic(time[near], values[near])(instants)
+        return cubic(time[near], values[near])(instants)
 
     def instants(self, time: Array) -> Array:
         """Return the times (count, points) of the points of the cycles [s]."""
@@ -233,7 +233,7 @@ def _refined_run(time: Array, displacement: Array, found: PeriodicSection) -> Cy
 def _fitted_period(time: Array, coarse: Array, displacement: Array, found: PeriodicSection) -> Cycles:
     """Fit the period to few cycles first, so that the shift never exceeds a small part of the cycle."""
     run = _whole_cycles(time, found, found.period)
-    course = _cubic(coarse, displacement)
+    course = cubic(coarse, displacement)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
         run = _whole_cycles(time, found, run.period + _shift_per_cycle(used, course(used.instants(coarse))))
@@ -283,13 +283,6 @@ def drift_over_cycles(folded: Array) -> Array:
     phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
     course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
     return np.asarray(course(order[:, None] + phase))
-
-
-def _cubic(time: Array, values: Array) -> Callable[[Array], Array]:
-    from scipy.interpolate import CubicSpline
-
-    course: Callable[[Array], Array] = CubicSpline(time, values)
-    return course
 
 
 # --- Edges of the run ---

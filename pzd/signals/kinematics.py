@@ -14,6 +14,7 @@ from pzd.record import Array
 from pzd.signals.cycles import Cycles
 from pzd.signals.measures import usual_step
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.splines import even_cubic, even_derivatives, is_even
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors: noise does so once in 10^7."""
@@ -96,28 +97,29 @@ def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
     """Return the average cycle and its derivatives at the samples inside the run."""
-    from scipy.interpolate import CubicSpline
-
     folded = run.fold(time, displacement)
     points = folded.shape[1]
     spectrum = np.where(significant_harmonics(folded), np.fft.rfft(folded.mean(axis=0)), 0.0)
     rate = 2j * np.pi * np.arange(spectrum.size) * run.frequency
     fine = 8 * points
     cycle = np.stack([np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)], axis=1)
-    grid = np.linspace(0.0, 1.0, fine + 1)
     phase = run.phase(time[run.inside(time)])
-    wrapped = CubicSpline(grid, np.concatenate((cycle, cycle[:1])), bc_type="periodic")(phase)
+    wrapped = even_cubic(cycle, periodic=True)(fine * phase)
     return Kinematics(*np.ascontiguousarray(wrapped.T))
 
 
 def _smoothed_motion(time: Array, displacement: Array, highest: float) -> Kinematics:
     """Smooth the displacement by cross-validation, with a corner of at most `highest` [Hz]."""
-    from scipy.interpolate import CubicSpline
-
     steps = np.diff(time)
     step = max(usual_step(time), float(time[-1] - time[0]) / (4.0 * time.size))
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)
-    smooth = CubicSpline(grid, low_pass(values, min(2.0 * np.pi * highest * step, HIGHEST)))
-    return Kinematics(smooth(time), smooth(time, 1), smooth(time, 2))
+    smooth = low_pass(values, min(2.0 * np.pi * highest * step, HIGHEST))
+    if regular and is_even(time):
+        speed, acceleration = even_derivatives(smooth)
+        return Kinematics(smooth, speed / step, acceleration / step**2)
+    from scipy.interpolate import CubicSpline
+
+    course = CubicSpline(grid, smooth)
+    return Kinematics(course(time), course(time, 1), course(time, 2))

@@ -9,7 +9,7 @@ from math import ceil
 from time import process_time
 from typing import Any
 
-PAIRS = 9
+PAIRS = 5
 LEAST_SECONDS = 0.02
 """A side of a pair is repeated until it takes this long, so that the clock does not count."""
 

@@ -192,8 +192,10 @@ def _extra(effects: Sequence[Effect]) -> Iterator[str]:
 
 def _parallel() -> Iterator[str]:
     """Yield the parallel forces without memory, a sum."""
-    terms = [_call(effect, "law", x="x", v="v", a="a") for effect in acting("parallel")]
-    yield from _function("parallel_force(x, v, a, p)", f"return {' + '.join(terms) or '0.0'}")
+    terms: list[str] = []
+    for effect in acting("parallel"):
+        terms += _guarded(effect, f"force += {_call(effect, 'law', x='x', v='v', a='a')}")
+    yield from _function("parallel_force(x, v, a, p)", "force = 0.0", *terms, "return force")
     yield from _function(
         "fill_parallel(x, v, a, rows, force)",
         "for i in range(x.size):",

@@ -28,6 +28,7 @@ from pzd.signals.lack_of_fit import fit_smooth_residual
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, PureError, pure_error
 from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.splines import cubic, even_cubic
 
 # --- Nuisances
 
@@ -198,15 +199,12 @@ class WeightedRecord:
 
     def _course(self, simulated: Array) -> Callable[[Array], Array]:
         """Return values (m,) or (m, p) along the motion as a function of moments [s], by a cubic between samples."""
-        from scipy.interpolate import CubicSpline
-
         begin, time = self._begin, self.motion.time[self._begin :]
-        if begin == 0:
-            course = CubicSpline(time, simulated)
-            return lambda moments: np.asarray(course(np.clip(moments, time[0], time[-1])))
-        period = time[-1] - time[0] + self.steps[-1]
-        whole = np.concatenate([simulated[begin:], simulated[begin : begin + 1]])
-        return CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
+        if begin > 0:
+            cycle, step = even_cubic(simulated[begin:], periodic=True), self.steps[0]
+            return lambda moments: cycle((moments - time[0]) / step)
+        course = cubic(time, simulated)
+        return lambda moments: course(np.clip(moments, time[0], time[-1]))
 
     def delayed(self, shown: Array) -> Callable[[float], Array]:
         """Return what a channel shows along the motion, (m,) or (m, p), at the compared samples by a delay [s]."""

@@ -276,7 +276,7 @@ def motion(time: float, y: Array, ride: RunningRide, dy: Array) -> None:
             dy[State.DISSIPATED] += workspace[Axle.FORCE, i] * workspace[Axle.RATE, i]
 
 
-@inlined
+@compiled
 def _act(time: float, y: Array, ride: RunningRide) -> None:
     """Fill the damper forces, and dV/dt of both axles."""
     model, control, workspace = ride

@@ -83,7 +83,7 @@ def _reach(i: int, dt: float, first: int, last: int, y: Array, integrator: Integ
         integrator.end[n] = y[n] + dt * change
 
 
-@inlined
+@compiled
 def trial(time: float, dt: float, y: Array, ride: RunningRide, integrator: Integrator) -> float:
     """Fill the end of the integrator with the state after dt; the workspace is left as it is there.
 
@@ -146,7 +146,7 @@ def beyond(control: Array, workspace: Array, axle: int) -> float:
     return float(-side * workspace[Axle.RATE, axle] / _CROSSED - 1.0)
 
 
-@inlined
+@compiled
 def farthest(ride: RunningRide) -> float:
     """Return the larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
     model, control, workspace = ride

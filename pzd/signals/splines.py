@@ -1,0 +1,117 @@
+"""Interpolating cubic splines: through even samples ten times as fast to set up as through any others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pzd.record import Array
+
+_ROOT = float(np.sqrt(3.0)) - 2.0
+"""Root of z^2 + 4 z + 1: what an end of the samples adds to the coefficients dies away with its powers."""
+_EVEN = 1e-6
+"""Largest distance of a sample to an even clock [samples]: less is rounding of the recorded times."""
+_FEWEST = 4
+"""Fewest samples that determine a cubic."""
+_NEAR = 32
+"""Coefficients that an end of the samples changes: the power is 5e-19 then."""
+
+
+def cubic(time: Array, values: Array) -> Callable[[Array], Array]:
+    """Return the cubic spline through samples (n,) or (n, p) as a function of time, not-a-knot at either end.
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing [s]
+    values : (n,) or (n, p)
+    """
+    if not is_even(time):
+        from scipy.interpolate import CubicSpline
+
+        uneven: Callable[[Array], Array] = CubicSpline(time, values)
+        return uneven
+    course, step = even_cubic(values), (time[-1] - time[0]) / (time.size - 1)
+    return lambda moments: course((moments - time[0]) / step)
+
+
+def is_even(time: Array) -> bool:
+    """Whether samples (n,), n >= 2, lie on an even clock."""
+    clock = np.linspace(time[0], time[-1], time.size)
+    return bool(np.max(np.abs(time - clock)) <= _EVEN * (clock[1] - clock[0]))
+
+
+def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Array]:
+    """Return the cubic spline through even samples as a function of the position among them.
+
+    Equation: s(j) = (c_{j-1} + 4 c_j + c_{j+1})/6 at sample j; where the samples do not repeat, the third derivative is
+    continuous at the last but one of either end (not-a-knot)
+    Source: Unser, Aldroubi and Eden 1993, IEEE Trans. Signal Process. 41, 821-848
+
+    Parameters
+    ----------
+    values : (n,) or (n, p) samples; where they repeat those of one period, the first one not given again
+    periodic : whether they repeat
+
+    Returns
+    -------
+    function that gives the values (...) or (..., p) at positions (...), counted in samples from the first one; beyond
+    the ends of what does not repeat it continues the outermost cubics
+
+    Examples
+    --------
+    >>> even_cubic(np.arange(6.0) ** 3)(np.array([2.5, 6.0])).round(9).tolist()
+    [15.625, 216.0]
+    """
+    count = len(values)
+    if count < _FEWEST and not periodic:
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(np.arange(count), values)  # a line or a parabola
+    c = _coefficients(values, periodic=periodic)
+
+    def at(position: Array) -> Array:
+        inside = np.mod(position, count) if periodic else position
+        first = np.floor(inside) if periodic else np.clip(np.floor(inside), 0, count - 2)
+        share = np.expand_dims(inside - first, tuple(range(first.ndim, first.ndim + values.ndim - 1)))
+        rest, k = 1.0 - share, first.astype(np.intp)
+        found = rest**3 * c[k]
+        found += (4.0 - 3.0 * share**2 * (1.0 + rest)) * c[k + 1]
+        found += (4.0 - 3.0 * rest**2 * (1.0 + share)) * c[k + 2]
+        found += share**3 * c[k + 3]
+        return np.asarray(found / 6.0)
+
+    return at
+
+
+def even_derivatives(values: Array) -> tuple[Array, Array]:
+    """Return first and second derivative of the cubic spline through even samples (n,), n >= 4, at the samples.
+
+    Equation: s'(j) = (c_{j+1} - c_{j-1})/2, s''(j) = c_{j-1} - 2 c_j + c_{j+1}, per sample; see `even_cubic`
+    """
+    c = _coefficients(values, periodic=False)
+    return np.asarray(0.5 * (c[2:] - c[:-2])), np.asarray(c[:-2] - 2.0 * c[1:-1] + c[2:])
+
+
+def _coefficients(values: Array, *, periodic: bool) -> Array:
+    """Return the coefficients c_{-1}, c_0, ... to c_n, or to c_{n+2} of what repeats."""
+    from scipy.ndimage import spline_filter1d
+
+    count = len(values)
+    c = spline_filter1d(values, 3, axis=0, mode="grid-wrap" if periodic else "mirror")
+    return c[np.arange(-1, count + 3) % count] if periodic else _not_a_knot(np.concatenate([c[1:2], c, c[-2:-1]]))
+
+
+def _not_a_knot(c: Array) -> Array:
+    """Return coefficients (n + 2,) or (n + 2, p) of the same samples without a knot at the last but one of either end.
+
+    What may be added to them without a change at a sample is a z^j + b z^(n + 1 - j).
+    """
+    size, near = (1.0 - _ROOT) ** 4, min(len(c), _NEAR)
+    mode = _ROOT ** np.arange(near).reshape(-1, *([1] * (c.ndim - 1)))
+    left, right = np.diff(c[:5], 4, axis=0), np.diff(c[-5:], 4, axis=0)
+    coupled = _ROOT ** (len(c) - 5)
+    share = 1.0 / (size * (1.0 - coupled**2))
+    c[:near] -= share * (left - coupled * right) * mode
+    c[-near:] -= share * (right - coupled * left) * mode[::-1]
+    return c
