@@ -112,7 +112,7 @@ class Medium:
         if estimate.interval is None:
             return f"{self.amount(estimate.value)} (no interval)"
         value, low, high = (self.number(float(text), MOST_DIGITS) for text in estimate.digits())
-        return f"{value} ({low} to {high})"
+        return f"{value} ({low}{self.space}to{self.space}{high})"
 
 
 TERMINAL = Medium("-", lambda value, digits: f"{value:.{digits}g}", lambda unit: unit.removeprefix("-"), " ", 1)

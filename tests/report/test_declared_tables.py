@@ -67,4 +67,4 @@ def test_a_unit_stands_in_the_head_of_estimates_on_the_page_too() -> None:
     rows = [SimpleNamespace(c=Estimate(1510.0, 1490.0, 1530.0))]
     block = Table("Damping", (Column("c", "C", "N s/m"),), rows).block()
     assert block.header == ("C [N s/m]",)
-    assert block.rows == (("1\u202f510 (1\u202f490 to 1\u202f530)",),)
+    assert block.rows == (("1\u202f510 (1\u202f490\u00a0to\u00a01\u202f530)",),)
