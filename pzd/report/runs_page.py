@@ -31,13 +31,14 @@ from pzd.report.blocks import (
 from pzd.report.columns import Cell, Column, Table
 from pzd.report.drawing import AXIS, Panel, axes_with_difference, encoded, legend, styled
 from pzd.report.page import render
+from pzd.simulate.study.plan import PLAIN_SUFFIX
 
 _FOOTER = "Written by pzd compare. Every number of this page stands in the files of the runs, or follows from them."
 _COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of Okabe and Ito (2008), in the order of the runs."""
 _MOST_CURVES = 8
 """Control values that are drawn: those that most runs share."""
-_MOST_RIDES = 12
+_MOST_RIDES = 20
 """Rides beyond which their table is folded."""
 
 
@@ -226,11 +227,11 @@ def _effect_tables(runs: Sequence[ComparedRun]) -> Iterator[Table]:
 
 
 def _ride_table(runs: Sequence[ComparedRun]) -> Table:
-    """Return a_w of every ride that two runs or more have."""
+    """Return a_w of every ride on the adopted damper that two runs or more have."""
     found: dict[str, dict[str, Estimate]] = {}
     for run in runs:
         for row in run.comfort:
-            if row.measure == "a_w":
+            if row.measure == "a_w" and not row.case.endswith(PLAIN_SUFFIX):
                 found.setdefault(row.case, {})[run.name] = Estimate(row.value)
     rows = [_Row(case, values) for case, values in found.items() if len(values) > 1]
     return replace(_table("a_w of each ride", "ride", "m/s2", rows, runs), fold=_MOST_RIDES)
