@@ -40,6 +40,9 @@ class ReferenceRow(Frozen):
     note: str
 
 
+ANSWER = "answer.txt"
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
     """The comfort numbers and the page."""
@@ -51,11 +54,15 @@ class Report:
     """report.html, whole."""
     reference: tuple[ReferenceRow, ...] | None = None
     """None where the config names no expected numbers."""
+    answer: tuple[str, ...] = ()
+    """What came out, in a few sentences: those with which the page begins."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write comfort.csv, report.html and, where the config names expected numbers, reference.csv."""
+        """Write comfort.csv, report.html, answer.txt and, where the config names expected numbers, reference.csv."""
         write_rows(folder / "comfort.csv", ComfortRow, self.comfort, control)
         (folder / "report.html").write_text(self.page, encoding="utf-8")
+        if self.answer:
+            (folder / ANSWER).write_text("\n".join(self.answer) + "\n", encoding="utf-8", newline="\n")
         if self.reference is not None:
             write_rows(folder / "reference.csv", ReferenceRow, self.reference, control)
 
@@ -67,7 +74,14 @@ class Report:
             read_rows(folder / "comfort.csv", ComfortRow, control),
             (folder / "report.html").read_text(encoding="utf-8"),
             read_rows(reference, ReferenceRow, control) if reference.exists() else None,
+            cls.read_answer(folder),
         )
+
+    @staticmethod
+    def read_answer(folder: Path) -> tuple[str, ...]:
+        """Read what came out; nothing where an earlier version wrote the folder."""
+        answer = folder / ANSWER
+        return tuple(answer.read_text(encoding="utf-8").splitlines()) if answer.is_file() else ()
 
 
 class Manifest(Frozen):

@@ -29,9 +29,9 @@ _SUMMARIES = {
 
 
 def _page(run: Run, **_: bool) -> list[str]:
-    from pzd.pipeline.run_summary import page_of
+    from pzd.pipeline.run_summary import answer_of, page_of
 
-    return [f"report: {page_of(run)}"]
+    return [*answer_of(run), f"report: {page_of(run)}"]
 
 
 def _diagnosis(run: Run, *, verbose: bool) -> list[str]:

@@ -80,6 +80,11 @@ def page_of(run: Run) -> Path:
     return run.folder / Report.folder / "report.html"
 
 
+def answer_of(run: Run) -> tuple[str, ...]:
+    """Return what came out of a run, in a few sentences; nothing before there is a report."""
+    return Report.read_answer(run.folder / Report.folder)
+
+
 def run_summary(run: Run) -> RunSummary:
     """Return the numbers in a run's folder, checked, under the name that the control had when they were written.
 

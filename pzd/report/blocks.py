@@ -106,6 +106,19 @@ def shortened(label: str) -> str:
     return f"{label[:half]}…{label[half + 1 - _LONGEST_LABEL :]}"
 
 
+_TYPEWRITTEN = {raised: chr(plain) for plain, raised in _SUPERSCRIPT.items()}
+_TYPEWRITTEN |= str.maketrans({NO_BREAK: " ", THIN: "", MINUS: "-", TIMES: "x", DASH: "-", "\u00b0": "deg"})
+
+
+def typewritten(text: str) -> str:
+    """Return a text of the page with the signs that every terminal has.
+
+    >>> typewritten(f"a_w {amount(-0.65, 'm/s2')}")
+    'a_w -0.65 m/s2'
+    """
+    return text.translate(_TYPEWRITTEN)
+
+
 def sentence(text: str) -> str:
     """Return text with a capital at its start and a full stop at its end."""
     text = text.strip()

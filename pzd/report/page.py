@@ -29,6 +29,7 @@ from pzd.report.blocks import (
     percent,
     sentence,
     spelled,
+    typewritten,
 )
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
@@ -240,6 +241,13 @@ def answer(context: ReportContext) -> str:
     if not context.damper.extended or gap.after == gap.before:
         return f"{text}: its error {on} is {before} of the force, and noise alone would leave {noise}."
     return f"{text}: with it the error {on} falls from {before} to {after} of the force; noise alone leaves {noise}."
+
+
+def told(context: ReportContext) -> tuple[str, ...]:
+    """Return what a terminal says at the end: the answer, and how the rides compare, a sentence or two a line."""
+    comfort = _comfort(context) if context.ridden else None
+    lines = [answer(context), *([f"{comfort.question} {comfort.answer}.", comfort.detail] if comfort else [])]
+    return tuple(typewritten(line) for line in lines if line)
 
 
 # --- The page ---

@@ -50,7 +50,7 @@ def report(
     # imported when the stage runs: `pzd check` needs its signature alone
     from pzd.report.context import ReportContext
     from pzd.report.damper_models import DamperModels
-    from pzd.report.page import page
+    from pzd.report.page import page, told
     from pzd.report.reference import compared, file_of, read_reference
     from pzd.report.ride_comfort import RatedRides, assess, rated
     from pzd.report.rig_tests import RigTests, setting_in_use
@@ -68,4 +68,4 @@ def report(
     rides_rated = RatedRides(ratings, comfort, simulate, control)
     artefacts = (rig, identified, diagnosed, table, rides)
     context = ReportContext(config, simulate, *artefacts, control, used, tests, dampers, rides_rated, reference)
-    return Report(comfort=comfort, page=page(context, jobs), reference=reference)
+    return Report(comfort=comfort, page=page(context, jobs), reference=reference, answer=told(context))

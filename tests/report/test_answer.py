@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pzd.report.blocks import amount
+from pzd.report.blocks import amount, typewritten
 from pzd.report.config import ReportConfig
 from pzd.report.page import answer
 from pzd.report.plots.answer import best_policy, closing, missed_loop
@@ -103,3 +103,18 @@ def test_the_best_policy_is_the_one_with_the_least_a_w_and_stands_out(run: Any, 
     bold = [text.get_text() for text in panel.figure.axes[0].texts if text.get_weight() == "bold"]
     assert bold == ["best fixed voltage"]
     assert "best fixed voltage is the most comfortable" in panel.caption
+
+
+def test_the_terminal_ends_with_what_the_page_begins_with_in_signs_that_it_has(run: Any, context_of: Any) -> None:
+    """The best policy leads, and the law of the paper is told beside it with the reason why it falls behind."""
+    found = run.told()
+    first, best, why = found.answer
+    assert first == typewritten(answer(context_of(run)))
+    assert best.startswith("Which policy rides best? 2.25 Hz sine: best fixed voltage 62 V, a_w ")
+    assert "The law of the paper (policy comfort) beside the best fixed voltage, dynamic: 2.25 Hz sine: a_w " in why
+    assert "It knows neither the lag of the valve nor the oil spring." in why
+    assert all(line.isascii() for line in found.answer)
+
+
+def test_without_rides_the_terminal_tells_of_the_damper_alone(run: Any) -> None:
+    assert len(run.with_rides([]).told().answer) == 1

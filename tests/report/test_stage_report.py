@@ -155,7 +155,7 @@ def test_a_table_without_a_ride_of_the_summary_is_refused_by_name(run: Any) -> N
 def test_the_report_writes_itself_and_reads_itself_back(told: Report, tmp_path: Path) -> None:
     told.write(tmp_path, Control())
     again = Report.read(tmp_path, Control())
-    assert (again.comfort, again.page, again.reference) == (told.comfort, told.page, None)
+    assert (again.comfort, again.page, again.reference, again.answer) == (told.comfort, told.page, None, told.answer)
     header = (tmp_path / "comfort.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header == "case,point,edition,measure,value,unit,status"
 
