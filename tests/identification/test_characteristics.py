@@ -234,7 +234,7 @@ def test_faster_tests_lead_to_rest_along_a_line() -> None:
 
 @pytest.mark.parametrize("bent", [False, True])
 def test_a_rebound_unlike_compression_is_no_gas_force(bent: bool) -> None:
-    """Three times the damping in rebound, straight or digressive: two speeds led to a gas of 780 N, and there is none."""
+    """Three times the damping in rebound, straight or digressive: two speeds led to a gas of 780 N; there is none."""
     record = at_constant_speed(SPEEDS, Bingham(1.0, 1.0, 4e5))
     v = record.velocity
     way = np.where(v > 0.0, 3.0, 1.0) * v
