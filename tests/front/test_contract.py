@@ -171,11 +171,11 @@ NO_KEYS = re.compile(r"rate_Hz|split:|columns:|units:|sign:")
     ids=["sign", "units", "counting", "digits", "two tests", "exchanged"],
 )
 def test_advice_about_a_file_is_worded_for_arrays_and_then_accepted(
-    change, advice: str, remedy: dict[str, int]
+    change, advice: str, remedy: dict[str, int], rng: np.random.Generator
 ) -> None:
     arrays = sine()
     if "exchanged" in advice:  # a rough force, as any that is measured
-        arrays["force"] = arrays["force"] + np.random.default_rng(1).standard_normal(arrays["force"].size)
+        arrays["force"] = arrays["force"] + rng.standard_normal(arrays["force"].size)
     with pytest.raises(ValueError, match=re.escape(advice)) as caught:
         pzd.Test(**{**arrays, **{name: made(arrays) for name, made in change.items()}})
     assert not NO_KEYS.search(str(caught.value))

@@ -227,7 +227,7 @@ def low_passed(damper: Drawn, order: int, corner: float, values: Array) -> Array
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("kind", ["sine", "two tones"])
+@pytest.mark.parametrize("kind", ["sine", pytest.param("two tones", marks=pytest.mark.ci)])
 def test_a_low_pass_of_the_force_is_told_with_its_corner(kind: str, order: int, rng: np.random.Generator) -> None:
     """Of a damper with friction: behind a low-pass of first order a viscous one is one on an oil spring."""
     told: list[Finding] = []
