@@ -98,6 +98,10 @@ plain-study: $(DEV)  ## Measure 600 plain dampers from everywhere: whether pzd s
 fuzz: $(DEV)  ## Read damaged files of every format, and texts as units: only refusals may come of it; 15 minutes
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests:tests/rig $(BIN)/python tests/studies/fuzz.py
 
+.PHONY: crash-study
+crash-study: $(DEV)  ## Kill a small run at 100 instants, and finish it each time: nothing may be torn; half an hour
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/crash_study.py --kills 100
+
 .PHONY: sensitivity
 sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py

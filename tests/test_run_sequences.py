@@ -7,6 +7,7 @@ import hashlib
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import threading
@@ -252,3 +253,19 @@ def test_nothing_is_lost_or_torn_whatever_happens_to_a_run() -> None:
 @pytest.mark.ci
 def test_nothing_is_lost_or_torn_in_long_sequences() -> None:
     run_state_machine_as_test(Sequences, settings=settings(FEW, max_examples=200, stateful_step_count=30))
+
+
+@pytest.mark.ci
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL, and no sessions")
+def test_a_run_that_is_killed_at_any_instant_is_finished_to_the_same_bytes(root: Path) -> None:
+    """A short run of `make crash-study`."""
+    done = subprocess.run(
+        [sys.executable, root / "tests/studies/crash_study.py", "--kills", "5"],
+        env=os.environ | {"PYTHONPATH": str(root)},
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600.0,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

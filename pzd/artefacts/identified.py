@@ -62,10 +62,11 @@ class ContinuousVelocityRow(RecordRow):
 class GasAndFrictionRow(ConditionRow):
     """Static force of one condition at mid-stroke: what the gas pushes with, and what friction holds either way."""
 
-    gas_force_N: float
-    """Mean of rebound and compression."""
-    friction_N: float
-    """Half of their difference."""
+    gas_force_N: float | None
+    """Mean of rebound and compression of a slow test; None without one, as the mean of faster ones is also that of a
+    damper whose rebound is unlike its compression."""
+    friction_N: float | None
+    """Half of their difference; None where faster tests lead to none."""
     velocity_m_per_s: float = Field(gt=0.0)
     """Of the slowest test, from which they are read."""
     middle_m: float

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -32,7 +31,7 @@ from pzd.quantities import (
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Limits
 from pzd.rig.preflight import PreflightRecord, examined
-from pzd.schema.errors import DataError
+from pzd.schema.errors import Advice, Advised, DataError
 from pzd.schema.yamlfile import document_of
 
 if TYPE_CHECKING:
@@ -44,18 +43,22 @@ UNNAMED = "test"
 
 FEWEST = 2
 """Samples of a test."""
-_OF_ARRAYS = re.compile(
-    r"(?:say )?\b(?:rate_Hz: N.*|(?P<what>sign|units): \{(?P<name>\w+): (?P<value>-?\w+)\}(?:, or units: .*)?)"
-)
-"""Advice about a file."""
 
 
-def _as_argument(advice: re.Match[str]) -> str:
-    """Return advice about a file as what to pass here."""
-    what, name, value = advice["what"], advice["name"], advice["value"]
-    if what is None:
-        return "pass time in seconds, which are numbers of samples over samples a second"
-    return f"pass {name}=-{name}" if what == "sign" else f"pass {name} in SI, not in {value}"
+def _as_argument(advice: Advice) -> str | None:
+    """Return advice about a file as what to pass here; None where an array needs none."""
+    match advice.key:
+        case "sign":
+            return f"pass {advice.quantity}=-{advice.quantity}{advice.when and f' {advice.when}'}"
+        case "rate_Hz":
+            return "pass time in seconds, which are numbers of samples over samples a second"
+        case "columns":
+            return "pass each as the other"
+        case "split":
+            return "make a pzd.Test of each part"
+        case "units" if advice.value != "s":
+            return f"pass {advice.quantity} in SI, not in {advice.value}"
+    return None
 
 
 class Test(Result):
@@ -122,7 +125,9 @@ class Test(Result):
             self.source = from_arrays(name or UNNAMED, channels, setting, Limits(), Control())
             """The record as it was prepared, with its cycles."""
         except DataError as error:
-            raise DataError(_OF_ARRAYS.sub(_as_argument, message) for message in error.messages) from None
+            raise DataError(
+                message.worded(_as_argument) if isinstance(message, Advised) else message for message in error.messages
+            ) from None
 
     @classmethod
     def of(cls, prepared: PreflightRecord) -> Self:

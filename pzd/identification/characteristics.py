@@ -148,6 +148,9 @@ def thinned(values: Array) -> Array:
 #
 # Equation: F_gas = (F_r + F_c) / 2, F_friction = (F_r - F_c) / 2, both at v -> 0
 # Source: definition; F_r and F_c are the forces in rebound and compression, compression being negative
+#
+# Away from rest the mean is that of the valves too, which are seldom alike both ways, and bend with the speed: no line
+# through two speeds leads to the gas force. Only a slow test tells it.
 
 SLOW_M_PER_S = 0.01
 """Largest speed of a static test [m/s]: labs measure gas force and friction at 1 to 10 mm/s."""
@@ -158,8 +161,9 @@ LEAST_SPEED_RATIO = 1.5
 def gas_and_friction(rows: Sequence[PeakVelocityRow]) -> tuple[GasAndFrictionRow, ...]:
     """Return one row for each condition with a test in both directions, from its slowest test.
 
-    Where that is not static, a line through it and the next speed is extrapolated to rest, which removes the damping;
-    where there is no other speed the row says so.
+    Where that is not static, the gas force cannot be told from asymmetry, and the friction is extrapolated to rest
+    along a line through it and the next speed, which removes the damping; where there is no other speed the row says
+    so.
 
     Parameters
     ----------
@@ -174,15 +178,18 @@ def gas_and_friction(rows: Sequence[PeakVelocityRow]) -> tuple[GasAndFrictionRow
 
 def _gas_and_friction_row(rows: Sequence[PeakVelocityRow]) -> GasAndFrictionRow:
     """Return gas force and friction from the rows of one condition, slowest first."""
+    gas: float | None
+    friction: float | None
     slowest = _same_speed(rows, rows[0])
     speed, gas, friction = _at_one_speed(slowest)
-    method: Method = "slow test" if speed <= SLOW_M_PER_S else "at the lowest speed"
-    faster = [row for row in rows if row.speed >= LEAST_SPEED_RATIO * speed]
-    if speed > SLOW_M_PER_S and faster:
-        next_speed, next_gas, next_friction = _at_one_speed(_same_speed(faster, faster[0]))
-        share = speed / (next_speed - speed)
-        gas, friction = gas - share * (next_gas - gas), friction - share * (next_friction - friction)
-        method = "extrapolated to rest"
+    method: Method = "slow test"
+    if speed > SLOW_M_PER_S:
+        gas, method = None, "at the lowest speed"
+        faster = [row for row in rows if row.speed >= LEAST_SPEED_RATIO * speed]
+        if faster:
+            next_speed, _, next_friction = _at_one_speed(_same_speed(faster, faster[0]))
+            at_rest = friction - speed / (next_speed - speed) * (next_friction - friction)
+            friction, method = at_rest if at_rest >= 0.0 else None, "extrapolated to rest"
     return GasAndFrictionRow(
         **label_columns((rows[0].setting, rows[0].voltage_V, rows[0].temperature_degC)),
         gas_force_N=gas,

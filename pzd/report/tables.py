@@ -87,12 +87,16 @@ def _base_value(row: ParameterRow | BaseRow, name: str) -> Estimate:
 # --- identify: characteristics, without any model ---
 
 
+NO_GAS = "cannot be told from asymmetry"
+"""Of the gas force without a slow test."""
+
+
 def characteristics(found: Characteristics, control: Control) -> Iterator[Table]:
     """Yield the tables of what the tests show without any model: those that have rows."""
     setting, _, temperature = conditions(control)
 
-    def static_force(row: GasAndFrictionRow, value: float) -> Difference:
-        return Difference(value, slowest_test_force(found, row))
+    def static_force(row: GasAndFrictionRow, value: float | None, untold: str) -> Difference | str:
+        return untold if value is None else Difference(value, slowest_test_force(found, row))
 
     tables = (
         Table(
@@ -114,8 +118,8 @@ def characteristics(found: Characteristics, control: Control) -> Iterator[Table]
             "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
             (
                 *conditions(control),
-                Column("gas_force_N", "gas force", "N", lambda row: static_force(row, row.gas_force_N)),
-                Column("friction_N", "friction", "N", lambda row: static_force(row, row.friction_N)),
+                Column("gas_force_N", "gas force", "N", lambda row: static_force(row, row.gas_force_N, NO_GAS)),
+                Column("friction_N", "friction", "N", lambda row: static_force(row, row.friction_N, "none shows")),
                 Column("velocity_m_per_s", "slowest speed", "m/s"),
                 Column("method", "how"),
             ),
@@ -209,10 +213,11 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
         directions,
     )
     yield Table(
-        "Gas force at mid-stroke and seal friction with 95 % intervals, and the status of the condition",
+        "Force beside the law at mid-stroke (of the gas, where a slow test shows the same) and seal friction with 95 % "
+        "intervals, and the status of the condition",
         (
             *conditions(control, lambda each: each.row),
-            _estimated("gas_force_N", "gas force", "N"),
+            _estimated("gas_force_N", "offset", "N"),
             _estimated("friction_N", "seal friction", "N"),
             Column("status", "status", value=lambda each: each.row.status),
         ),

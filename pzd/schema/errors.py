@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 
 class UserError(Exception):
@@ -35,6 +36,46 @@ class FilesError(UserError):
     """Files, disk or locks that cannot be used."""
 
     exit_code = 5
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to say under one key of an entry of `rig.files`, so that a file is read as it was meant."""
+
+    key: str
+    """`sign`, `units`, `rate_Hz`, `split` or `columns`"""
+    value: str
+    """As it is written in the config."""
+    quantity: str | None = None
+    """What it is about, where the key has one value for each quantity."""
+    when: str = ""
+    """Behind it: where or whether this is the one."""
+
+    def __str__(self) -> str:
+        """Return it as it is written in the config."""
+        value = self.value if self.quantity is None else f"{{{self.quantity}: {self.value}}}"
+        return f"{self.key}: {value}{self.when and f' {self.when}'}"
+
+
+class Advised(str):
+    """A message about a file that ends in advice: who gives no file words it from what it says."""
+
+    __slots__ = ("advice", "fault")
+
+    fault: str
+    """Up to the advice."""
+    advice: tuple[Advice, ...]
+
+    def __new__(cls, fault: str, *advice: Advice) -> Self:
+        """Make the message from the fault, up to the advice, and from one or several ways to mend it."""
+        made = super().__new__(cls, f"{fault} say {', or '.join(map(str, advice))}")
+        made.fault, made.advice = fault, advice
+        return made
+
+    def worded(self, how: Callable[[Advice], str | None]) -> str:
+        """Return the message with each advice in other words; None where it says nothing elsewhere."""
+        told = dict.fromkeys(words for words in map(how, self.advice) if words is not None)
+        return f"{self.fault} {', or '.join(told)}" if told else self.fault.rstrip("; ")
 
 
 def at(path: object, line: int | None = None, column: int | None = None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import pkgutil
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -147,6 +148,39 @@ def test_a_faulty_test_is_refused_where_it_is_made(change, error: type[Exception
     arrays = sine()
     with pytest.raises(error, match=words):
         pzd.Test(**{**arrays, **{name: made(arrays) for name, made in change.items()}})
+
+
+NO_KEYS = re.compile(r"rate_Hz|split:|columns:|units:|sign:")
+"""What only a file can be given."""
+
+
+@pytest.mark.parametrize(
+    ("change", "advice", "remedy"),
+    [
+        ({"force": lambda a: -a["force"]}, "pass force=-force where the displacement grows in rebound", {}),
+        ({"displacement": lambda a: 1e3 * a["displacement"]}, "pass displacement in SI, not in mm", {}),
+        ({"time": lambda a: np.arange(2000)}, "pass time in seconds, which are numbers of samples over samples", {}),
+        ({"time": lambda a: 0.1 * np.floor(a["time"] / 0.1)}, "too few digits; pass time in seconds, which are", {}),
+        ({"time": lambda a: a["time"] + 1e5 * (a["time"] > 2.0)}, "make a pzd.Test of each part", {"rows": 900}),
+        (
+            {"displacement": lambda a: a["force"] / 1e4, "force": lambda a: 1e3 * a["displacement"]},
+            "exchanged, since the displacement is rough and the force smooth; pass each as the other",
+            {},
+        ),
+    ],
+    ids=["sign", "units", "counting", "digits", "two tests", "exchanged"],
+)
+def test_advice_about_a_file_is_worded_for_arrays_and_then_accepted(
+    change, advice: str, remedy: dict[str, int], rng: np.random.Generator
+) -> None:
+    arrays = sine()
+    if "exchanged" in advice:  # a rough force, as any that is measured
+        arrays["force"] = arrays["force"] + rng.standard_normal(arrays["force"].size)
+    with pytest.raises(ValueError, match=re.escape(advice)) as caught:
+        pzd.Test(**{**arrays, **{name: made(arrays) for name, made in change.items()}})
+    assert not NO_KEYS.search(str(caught.value))
+    rows = slice(remedy.get("rows"))
+    assert pzd.Test(**{name: values[rows] for name, values in arrays.items()}).force.max() > 300.0
 
 
 def test_the_advice_of_a_refusal_is_accepted() -> None:

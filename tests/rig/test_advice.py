@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -262,3 +263,14 @@ def test_the_advice_of_a_finding_is_accepted(tmp_path: Path) -> None:
     (told,) = run(tmp_path).entries[0].findings
     assert told.follows.endswith("left out: the speed is derived from the displacement")
     assert run(tmp_path, {"path": "a.csv", "columns": {"velocity": ""}}).entries[0].findings == ()
+
+
+def test_numbers_beyond_all_measure_are_refused_without_a_warning(tmp_path: Path) -> None:
+    """Their products overflow, and what numpy says of that would stand on the screen."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for force, unit in ((1e300 * FORCE, "N"), (1e306 * np.sign(FORCE), "GN")):
+            write(tmp_path / "a.csv", lines({"time_s": TIME, "displacement_m": 1e10 * X, "F": force}))
+            guessed([tmp_path / "a.csv"])
+            said = refused(tmp_path, {"path": "a.csv", "columns": {"force": "F"}, "units": {"force": unit}})
+            assert any("no force is so large" in one for one in said)

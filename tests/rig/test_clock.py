@@ -168,7 +168,7 @@ def test_a_clock_of_too_few_digits_is_counted_as_the_refusal_says(tmp_path: Path
     later = 10.0 + np.arange(TIME.size) / 3000.0
     write(tmp_path / "a.csv", lines({"time_s": [f"{t:.5g}" for t in later], **WITHOUT_TIME}))
     (said,) = refused(tmp_path)
-    (rate,) = re.findall(r"rate_Hz, about ([0-9.]+) here", said)
+    (rate,) = re.findall(r"say rate_Hz: ([0-9.]+) or", said)
     for columns in ({}, {"columns": {"time": ""}}):
         (entry,) = run(tmp_path, {"path": "a.csv", "rate_Hz": float(rate), **columns}).entries
         assert entry.rate_Hz == pytest.approx(3000.0, rel=5e-3)

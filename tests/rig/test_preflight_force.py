@@ -8,8 +8,9 @@ import pytest
 from pzd.damper.element import element_force
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
-from pzd.rig.preflight import PreflightRecord, force
-from pzd.rig.preflight.force import ReferenceFit, Section, delay
+from pzd.rig.preflight import PreflightRecord, force, reference
+from pzd.rig.preflight.force import delay
+from pzd.rig.preflight.reference import ReferenceFit, Section
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -49,13 +50,14 @@ def test_delays_are_looked_for_only_where_the_element_leaves_something(
     x = 0.01 * np.sin(2.0 * np.pi * 2.0 * TIME)
     other = 500.0 * rng.standard_normal(TIME.size)
     asked: list[int] = []
-    search = force.fit_element
+    search = reference.fit_element
 
     def counted(section: Section, forces: Array) -> ReferenceFit:
         asked.append(len(forces))
         return search(section, forces)
 
-    monkeypatch.setattr(force, "fit_element", counted)
+    for module in (force, reference):
+        monkeypatch.setattr(module, "fit_element", counted)
     assert list(delay(measured(x, element_force(x, 1e-3, 300.0, 2500.0, 2e5)))) == []
     assert asked == [1]  # the undelayed fit alone
     list(delay(measured(x, other)))

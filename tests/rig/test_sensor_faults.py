@@ -7,21 +7,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter, lfilter_zi
 from written_files import lines, run, write
 
-from pzd.artefacts import Finding
+from pzd.artefacts import Finding, RecordEntry
 from pzd.damper.element import element_force
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.record import Array, Record, conditions, distinct
 from pzd.rig.config import Limits
-from pzd.rig.preflight import PreflightRecord, findings
+from pzd.rig.preflight import Check, PreflightRecord, findings
+from pzd.rig.preflight.amplifier import amplifier, drop_contradicting_filters
+from pzd.rig.preflight.force import delay
+from pzd.rig.preflight.sensors import drift, dropouts, gain_step, held_channel, quantisation
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
-FINE = 8
+FINE = 4
 """Steps of the truth between two samples."""
 DRAWS = 15
+FEWER = 8
+"""Draws of what takes a search."""
 
 
 @dataclass(frozen=True)
@@ -80,15 +86,20 @@ def drawn(rng: np.random.Generator, kind: str = "sine", friction: float | None =
     return Drawn(rate, frequency, amplitude, time, x, force, noise, float(rng.choice([0.0, rng.uniform(0.0, 5e-6)])))
 
 
-def found(one: Record) -> tuple[Finding, ...]:
+def prepared(one: Record) -> PreflightRecord:
     run_of = cycles(one.time, one.displacement)
     clean = kinematics(one.time, one.displacement, run_of)
     whole = replace(one, velocity=clean.velocity, acceleration=clean.acceleration)
-    return findings(PreflightRecord(whole, run_of, clean, Limits()))
+    return PreflightRecord(whole, run_of, clean, Limits())
 
 
-def sizes(records: list[Record], check: str) -> list[Finding]:
-    return [finding for record in records for finding in found(record) if finding.check == check]
+def found(one: Record) -> tuple[Finding, ...]:
+    return findings(prepared(one))
+
+
+def sizes(records: list[Record], check: Check) -> list[Finding]:
+    """What one check alone finds: the others take ten times as long."""
+    return [finding for record in records for finding in check(prepared(record))]
 
 
 @pytest.mark.parametrize("kind", ["sine", "triangle", "sweep", "two tones"])
@@ -102,7 +113,7 @@ def test_a_displacement_in_steps_is_told_with_their_size(steps: int, rng: np.ran
     for one in rng.spawn(DRAWS):
         damper = drawn(one)
         record, step = damper.recorded(one), 2.0 * damper.amplitude / steps
-        (told,) = sizes([replace(record, displacement=step * np.rint(record.displacement / step))], "quantisation")
+        (told,) = sizes([replace(record, displacement=step * np.rint(record.displacement / step))], quantisation)
         assert told.size == pytest.approx(step, rel=1e-3)
 
 
@@ -111,9 +122,9 @@ def test_fine_steps_are_told_where_the_motion_stands_still_between_them() -> Non
     x = 0.02 * np.sin(2.0 * np.pi * 0.1 * time)
     force = 80.0 * np.sign(np.cos(2.0 * np.pi * 0.1 * time)) + 0.1 * np.sin(1e3 * time)
     record = Record("a", None, time, x, x, x, force)
-    (told,) = sizes([replace(record, displacement=5e-5 * np.rint(x / 5e-5))], "quantisation")
+    (told,) = sizes([replace(record, displacement=5e-5 * np.rint(x / 5e-5))], quantisation)
     assert told.size == pytest.approx(5e-5)
-    assert sizes([replace(record, displacement=1e-6 * np.rint(x / 1e-6))], "quantisation") == []
+    assert sizes([replace(record, displacement=1e-6 * np.rint(x / 1e-6))], quantisation) == []
 
 
 @pytest.mark.parametrize("channel", ["force", "displacement"])
@@ -122,7 +133,7 @@ def test_a_channel_that_is_held_is_told_with_its_rate(channel: str, rng: np.rand
         record = drawn(one).recorded(one)
         every = int(np.ceil(record.rate / 50.0))
         values = getattr(record, channel)[np.arange(record.time.size) // every * every]
-        (told,) = [f for f in sizes([replace(record, **{channel: values})], "held") if channel in f.where]
+        (told,) = [f for f in sizes([replace(record, **{channel: values})], held_channel) if channel in f.where]
         assert told.size == pytest.approx(record.rate / every, rel=0.02)
 
 
@@ -140,7 +151,7 @@ def test_drop_outs_to_zero_are_counted(count: int, length: int, rng: np.random.G
         force[lost] = 0.0
         # What is lost where the force passes zero itself is within the noise.
         seen = np.abs(record.force[lost]) > 0.2 * np.abs(record.force).max()
-        found_here = sizes([replace(record, force=force)], "drop-outs")
+        found_here = sizes([replace(record, force=force)], dropouts)
         told.append(len(found_here) == 1 and found_here[0].size * force.size >= 0.7 * np.count_nonzero(seen))
     assert np.mean(told) >= 0.6  # nine in ten on average; of fifteen draws that is once in thousands fewer than this
 
@@ -171,7 +182,7 @@ def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rn
         record = damper.recorded(one)
         half = 0.5 * record.time[-1]
         force = record.force * np.where(record.time > half, gain, 1.0)
-        for finding in sizes([replace(record, force=force)], "gain"):
+        for finding in sizes([replace(record, force=force)], gain_step):
             told += 1
             assert finding.size == pytest.approx(gain, rel=0.03)
             about = float(finding.where.split("about ")[1].split(" s")[0])
@@ -186,7 +197,7 @@ def test_a_zero_that_drifts_is_told_with_its_change(rng: np.random.Generator) ->
         record = damper.recorded(one)
         change = 0.1 * float(np.abs(damper.force).max())
         force = record.force + change * np.linspace(0.0, 1.0, record.time.size)
-        shares += [told.size / change for told in sizes([replace(record, force=force)], "drift")]
+        shares += [told.size / change for told in sizes([replace(record, force=force)], drift)]
     assert DRAWS - 2 <= len(shares) <= DRAWS  # one in ninety is not told
     # The first and the last cycle are compared, which is less than the whole record.
     assert min(shares) > 0.8
@@ -202,12 +213,88 @@ def test_a_late_force_is_found_up_to_half_a_cycle(late: float, share: float, rng
         if late > 0.35 / damper.frequency:  # then the work is negative, and the file is refused
             continue
         tried += 1
-        told += [finding.size for finding in sizes([damper.recorded(one, late=late)], "delay")]
+        told += [finding.size for finding in sizes([damper.recorded(one, late=late)], delay)]
     assert len(told) >= share * tried
     # A flank of one sample is smeared over two where cycles are averaged, which passes for a little of a soft spring.
     assert np.median(told) == pytest.approx(late, rel=0.2)
     assert min(told) > 0.4 * late  # of 120 draws the least was half of it
     assert max(told) < 1.05 * late
+
+
+def low_passed(damper: Drawn, order: int, corner: float, values: Array) -> Array:
+    b, a = butter(order, 2.0 * corner / (damper.rate * FINE))
+    return np.asarray(lfilter(b, a, values, zi=lfilter_zi(b, a) * values[0])[0])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("kind", ["sine", pytest.param("two tones", marks=pytest.mark.ci)])
+def test_a_low_pass_of_the_force_is_told_with_its_corner(kind: str, order: int, rng: np.random.Generator) -> None:
+    """Of a damper with friction: behind a low-pass of first order a viscous one is one on an oil spring."""
+    told: list[Finding] = []
+    for one in rng.spawn(FEWER):
+        damper = drawn(one, kind, friction=float(one.uniform(0.3, 1.0)))
+        told += sizes([damper.recorded(one, low_passed(damper, order, 10.0, damper.force))], amplifier)
+    corners = [finding.size for finding in told if finding.check == "filter"]
+    assert len(corners) >= 0.7 * FEWER
+    assert np.median(corners) == pytest.approx(10.0, rel=0.2)
+    assert np.mean([7.0 < corner < 14.0 for corner in corners]) >= 0.8
+
+
+def test_filters_that_differ_between_the_channels_are_told(rng: np.random.Generator) -> None:
+    corners = []
+    for one in rng.spawn(FEWER):
+        damper = drawn(one, friction=0.5)
+        slow = replace(damper, x=low_passed(damper, 1, 60.0, damper.x))
+        corners += [f.size for f in sizes([slow.recorded(one, low_passed(damper, 1, 12.0, damper.force))], amplifier)]
+    assert len(corners) >= 0.7 * FEWER
+    assert np.median(corners) == pytest.approx(12.0, rel=0.3)
+
+
+@pytest.mark.parametrize("hard", [True, False])
+def test_a_force_that_saturates_below_the_noise_is_told_with_what_is_missing(
+    hard: bool, rng: np.random.Generator
+) -> None:
+    """Of a damper with damping: friction alone that is cut off is less friction."""
+    missing = []
+    for one in rng.spawn(FEWER):
+        damper = drawn(one, friction=float(one.uniform(0.0, 0.4)))
+        peak = float(np.abs(damper.force).max())
+        limit = 0.7 * peak
+        shown = np.clip(damper.force, -limit, limit) if hard else limit * np.tanh(damper.force / limit)
+        missing += [
+            (f.size / (peak - np.abs(shown).max()), "cut off" in f.where)
+            for f in sizes([damper.recorded(one, shown)], amplifier)
+            if f.check == "range"
+        ]
+    assert len(missing) >= 0.8 * FEWER
+    assert np.median([size for size, _ in missing]) == pytest.approx(1.0, rel=0.15)
+    assert np.mean([cut == hard for _, cut in missing]) >= 0.8
+
+
+def test_low_passes_that_differ_from_record_to_record_or_are_rare_are_a_law_that_is_missing() -> None:
+    def entries(*corners: float | None) -> tuple[RecordEntry, ...]:
+        return tuple(
+            RecordEntry(
+                name=str(n),
+                setting=None,
+                voltage_V=None,
+                temperature_degC=None,
+                rate_Hz=500.0,
+                cycles=8.0,
+                findings=()
+                if corner is None
+                else (Finding(check="filter", where="force", size=corner, unit="Hz", follows=""),),
+            )
+            for n, corner in enumerate(corners)
+        )
+
+    def left(*corners: float | None) -> int:
+        return sum(len(entry.findings) for entry in drop_contradicting_filters(entries(*corners)))
+
+    assert left(10.0, 11.0, 12.0) == 3
+    assert left(10.0, None, 11.0) == 2
+    assert left(10.0, 30.0, 11.0) == 0
+    assert left(10.0, None, None, None) == 0
 
 
 def test_a_velocity_at_odds_with_the_displacement_is_left_out_of_everything(

@@ -16,7 +16,7 @@ from pzd.record import Array, clock_fault
 from pzd.rig.files.channels import RawRecord, day_and_month_exchanged, instants
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.sheet import Sheet
-from pzd.schema.errors import DataError
+from pzd.schema.errors import Advice, Advised, DataError
 from pzd.schema.yamltree import written
 from pzd.signals.measures import slope
 
@@ -53,16 +53,15 @@ def standstills(test: RawRecord) -> list[str]:
     """Describe where the clock stands still or goes back; NaN is reported as a bad cell."""
     time = test.channels[TIME]
     fault = clock_fault(time)
-    return [f"{test.place(fault[0])}: {fault[1]}{_rounded(time)}"] if fault else []
-
-
-def _rounded(time: Array) -> str:
-    """Return the remedy where a clock (n,) stands still often and never goes back: it has too few digits."""
+    if not fault:
+        return []
+    told = f"{test.place(fault[0])}: {fault[1]}"
     steps = np.diff(time)
     if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
-        return ""
+        return [told]
     rate = (time.size - 1) / (time[-1] - time[0])
-    return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
+    when = "or what is known of it, and leave out the column of the time"
+    return [Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))]
 
 
 def _jump(test: RawRecord, layout: Layout) -> list[str]:
@@ -81,7 +80,10 @@ def _jump(test: RawRecord, layout: Layout) -> list[str]:
     if swapped is not None:
         return [f"{what}; day and month are exchanged: say units: {{time: {written(swapped)}}}"]
     return [
-        f"{what}; for another test say split: {{gap_s: {_two_digits(0.5 * longest)}}}, else write a clock that goes on"
+        Advised(
+            f"{what}; write a clock that goes on, or where another test begins",
+            Advice("split", f"{{gap_s: {_two_digits(0.5 * longest)}}}"),
+        )
     ]
 
 
@@ -115,21 +117,21 @@ def _two_rates(test: RawRecord) -> list[str]:
         near = slice(row * STRETCH, (row + 2) * STRETCH)
         turn = int(np.argmax(np.abs(np.log(steps[near] / old)) > 0.5 * np.log(OTHER_RATE))) + near.start
         rates = f"the clock goes on at {1.0 / new:.4g} Hz here, at {1.0 / old:.4g} Hz before"
-        return [f"{test.place(int(turn) + 1)}: {rates}; a record has one rate: {_cut_at(steps, int(turn))}"]
+        told = f"{test.place(int(turn) + 1)}: {rates}; a record has one rate"
+        others = float(np.max(np.delete(steps, turn)))
+        if steps[turn] > 2.0 * others:  # by a pause where one is there
+            gap = _two_digits(np.sqrt(steps[turn] * others))
+            return [Advised(f"{told};", Advice("split", f"{{gap_s: {gap}}}", when="to cut the file at this pause"))]
+        return [f"{told}: write the rows from here on into a file of their own"]
     return []
-
-
-def _cut_at(steps: Array, turn: int) -> str:
-    """Return how to cut a clock with these steps (n,) at one of them: by a pause where one is there."""
-    others = float(np.max(np.delete(steps, turn)))
-    if steps[turn] > 2.0 * others:
-        return f"cut the file at this pause, split: {{gap_s: {_two_digits(np.sqrt(steps[turn] * others))}}}"
-    return "write the rows from here on into a file of their own"
 
 
 def _two_digits(seconds: float) -> str:
     """Write seconds with two digits and without an exponent, as far as they can do without."""
     return f"{float(f'{seconds:.2g}'):g}"
+
+
+_UNITS_OF_TIME = Advice("units", "ms", TIME.name), Advice("units", "s", TIME.name, "if they are seconds")
 
 
 def _sample_numbers(test: RawRecord, layout: Layout) -> list[str]:
@@ -138,15 +140,14 @@ def _sample_numbers(test: RawRecord, layout: Layout) -> list[str]:
     if spec is None or spec.dated or not _counts(test.channels[TIME]):
         return []
     head = next(head for head in test.sheet.header if head in spec.headers)
-    remedy = "say rate_Hz: N for N samples a second" + (
-        " in the place of columns and units of time" if spec.named else ""
-    )
+    when = "for N samples a second" + (" in the place of columns and units of time" if spec.named else "")
+    rate = Advice("rate_Hz", "N", when=when)
     if _COUNTING.match(head):
-        return [f"{test.place(0)}: time: column {head!r} counts samples, no seconds; {remedy}"]
+        return [Advised(f"{test.place(0)}: time: column {head!r} counts samples, no seconds;", rate)]
     if spec.unit is not None:
         return []
     ask = "the clock counts whole seconds, one a row; are these numbers of samples, or milliseconds?"
-    return [f"{test.place(0)}: {ask} {remedy}, or units: {{time: ms}}, or units: {{time: s}} if they are seconds"]
+    return [Advised(f"{test.place(0)}: {ask}", rate, *_UNITS_OF_TIME)]
 
 
 def _counts(time: Array) -> bool:
@@ -163,8 +164,7 @@ def _milliseconds(test: RawRecord, layout: Layout) -> list[str]:
     if given or step < SLOWEST_STEP or speed > CREEPING:
         return []
     what = f"the clock goes in steps of {step:.4g} s while the motion reaches {1e3 * speed:.3g} mm/s"
-    remedy = "are these milliseconds? say units: {time: ms}, or units: {time: s} if they are seconds"
-    return [f"{test.place(0)}: {what}; {remedy}"]
+    return [Advised(f"{test.place(0)}: {what}; are these milliseconds?", *_UNITS_OF_TIME)]
 
 
 # --- Findings ---

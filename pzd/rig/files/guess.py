@@ -388,8 +388,10 @@ def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
         return False
     places = (sheet.header.index(columns[quantity]) for quantity in (DISPLACEMENT, FORCE))
     x, force = (sheet.numbers.get(place, np.empty(0)) for place in places)
-    known = x.size == force.size > 2 and bool(np.isfinite(x).all() and np.isfinite(force).all())
-    return known and work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
+    if not (x.size == force.size > 2 and np.isfinite(x).all() and np.isfinite(force).all()):
+        return False
+    x, force = (values / (float(np.abs(values).max()) or 1.0) for values in (x, force))  # in whatever units they are
+    return work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
 
 
 # --- The whole config ---

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from pzd.record import Array
 from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.clock import clock_faults, standstills
 from pzd.rig.files.layout import ChannelSpec, Layout
-from pzd.schema.errors import DataError
+from pzd.schema.errors import Advice, Advised, DataError
 from pzd.schema.yamltree import written
 from pzd.signals.measures import REVERSAL_SHARE, chance_work, despiked, reversals, rms, slope, work
 
@@ -50,7 +51,7 @@ def sign_faults(
     layout_of : file -> specification of each quantity
     others : the tests of the rig whose work is positive
     """
-    faults = []
+    faults: list[str] = []
     hints = [_hint(test, alone, layout_of[test.sheet.path], others) for test, alone in wrong]
     for (test, alone), hint in zip(wrong, hints, strict=True):
         layout = layout_of[test.sheet.path]
@@ -60,22 +61,29 @@ def sign_faults(
         done = work(alone.displacement, alone.force)
         what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
         signs = {spec.quantity.name: -spec.sign for spec in layout.channels}
-        x, force = (f"sign: {{{q.name}: {signs[q.name]}}}" for q in (DISPLACEMENT, FORCE))
+        turned = {name: Advice("sign", str(signs[name]), name) for name in (DISPLACEMENT.name, FORCE.name)}
         if _exchanged(alone):
             heads = [next(h for h in test.sheet.header if h in s.headers) for s in _both(layout)]
             faults.append(
-                f"{what}: displacement and force are exchanged, since the displacement is rough and the force smooth; "
-                f"say columns: {{displacement: {written(heads[1])}, force: {written(heads[0])}}}, with their units"
+                Advised(
+                    f"{what}: displacement and force are exchanged, since the displacement is rough and the force "
+                    "smooth;",
+                    Advice(
+                        "columns",
+                        f"{{displacement: {written(heads[1])}, force: {written(heads[0])}}}, with their units",
+                    ),
+                )
             )
         elif channel is None:
             faults.append(
-                f"{what}: force or displacement has the wrong sign, or this is an active load and no damper; say "
-                f"{force} where the displacement grows in rebound, or {x} where it grows in compression"
+                Advised(
+                    f"{what}: force or displacement has the wrong sign, or this is an active load and no damper;",
+                    replace(turned[FORCE.name], when="where the displacement grows in rebound"),
+                    replace(turned[DISPLACEMENT.name], when="where it grows in compression"),
+                )
             )
         else:
-            faults.append(
-                f"{what}: {channel} has the wrong sign, since {why}; say sign: {{{channel}: {signs[channel]}}}"
-            )
+            faults.append(Advised(f"{what}: {channel} has the wrong sign, since {why};", turned[channel]))
     return faults
 
 
@@ -189,8 +197,10 @@ def _too_large(test: RawRecord) -> list[str]:
     if np.ptp(x) > LONGEST_STROKE:
         row = int(np.argmax(np.abs(x - x[0])))
         found.append(
-            f"{test.place(row)}: a stroke of {np.ptp(x):.4g} m, above {LONGEST_STROKE:g} m; are these millimetres? "
-            "say units: {displacement: mm}"
+            Advised(
+                f"{test.place(row)}: a stroke of {np.ptp(x):.4g} m, above {LONGEST_STROKE:g} m; are these millimetres?",
+                Advice("units", "mm", DISPLACEMENT.name),
+            )
         )
     speeds = [(slope(time, x), "displacement over time gives")]
     if VELOCITY in test.channels:

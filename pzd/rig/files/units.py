@@ -108,11 +108,14 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
         size = float(sized[1])
         if not (np.isfinite(size) and size != 0.0):
             raise UnitError(f"{quantity.name}: {unit!r} is no size of a unit; write one like '2.5 {quantity.unit}'")
-        return to_canonical(values * size, sized[2], quantity)
+        with np.errstate(over="ignore"):
+            values = values * size
+        return to_canonical(values, sized[2], quantity)
     import pint
 
     try:
-        converted = _registry().Quantity(values, _parsed(unit)).to(_parsed(quantity.unit))
+        with np.errstate(over="ignore"):  # what is too large is refused as that
+            converted = _registry().Quantity(values, _parsed(unit)).to(_parsed(quantity.unit))
     except (pint.PintError, ValueError, AttributeError, TypeError, KeyError, ArithmeticError) as error:
         raise UnitError(
             f"{quantity.name}: {unit!r} is no unit of it ({_one_line(error)}); write one like {quantity.unit!r}"

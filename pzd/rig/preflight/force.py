@@ -13,19 +13,15 @@ whole laws to all tests, names `sensor_delay`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterator
 
 import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry
-from pzd.damper.element import element_forces
-from pzd.record import Array, is_constant, voltage_scale
+from pzd.record import is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
+from pzd.rig.preflight.reference import LEAST_RESIDUAL, Section, columns, fit_element, reference_fit
 from pzd.rig.preflight.sensors import coarse_step
-from pzd.signals.cycles import Cycles
-from pzd.signals.kinematics import mean_over_period
 
 # --- Offset ---
 
@@ -51,15 +47,13 @@ def offset(test: PreflightRecord) -> Iterator[Finding]:
     Equation: F = F_0 + k f(T0/k, C/k) + c_1 x + c_2 a               Source: least squares on a coarse element
     """
     section, fit = reference_fit(test)
-    force = section.delayed(np.zeros(1))[0]
-    (unit,) = forces_per_stiffness(section, [(fit.friction_extension, fit.lag)])
-    slip = min(np.mean(sign * unit > fit.friction_extension) for sign in (1.0, -1.0))
+    design = columns(section, fit)[section.shown]
+    slip = min(np.mean(sign * design[:, 1] > fit.friction_extension) for sign in (1.0, -1.0))
     if slip < LEAST_SLIP or not fit.explains():
         return
-    x = section.displacement - 0.5 * float(section.displacement.max() + section.displacement.min())
-    columns = (np.ones(x.size), unit, x, np.gradient(np.gradient(x)))
-    design = np.stack([column / (np.abs(column).max() or 1.0) for column in columns], axis=1)
-    size = float(np.linalg.lstsq(design, force, rcond=None)[0][0])
+    lengths = np.abs(design).max(axis=0)
+    force = section.force[section.shown]
+    size = float(np.linalg.lstsq(design / np.where(lengths > 0.0, lengths, 1.0), force, rcond=None)[0][0])
     low, high = np.percentile(test.record.force, (1, 99))
     share = size / (0.5 * float(high - low) or 1.0)
     if abs(share) > OFFSET_SHARE:
@@ -144,7 +138,7 @@ def delay(test: PreflightRecord) -> Iterator[Finding]:
     least = max(LEAST_DELAY, SAMPLES / test.record.rate, 0.5 * section.step)
     if abs(size) < least or residual > EXPLAINS * undelayed.residual:
         return
-    if _residual_of_rigid_damper(section) >= AS_WELL * residual:
+    if residual_of_rigid_damper(section) >= AS_WELL * residual:
         share = 1.0 - residual / undelayed.residual
         edge = ", at the edge of the search: it may be more" if at_edge else ""
         yield Finding(
@@ -201,183 +195,19 @@ def drop_contradicting_delays(entries: tuple[RecordEntry, ...]) -> tuple[RecordE
     )
 
 
-def _residual_of_rigid_damper(section: Section) -> float:
+def residual_of_rigid_damper(section: Section) -> float:
     """Share of the force's squares about its mean that a rigid damper with sigmoid friction leaves, undelayed.
 
     Equation: F = F_0 + c x + m a + C v + C_a abs(v) + q v abs(v) + sum of T_i tanh(v / v_i)    Source: least squares
     """
-    x, force = section.displacement, section.delayed(np.zeros(1))[0]
-    v = 0.5 * (np.roll(x, -1) - np.roll(x, 1)) if section.periodic else np.gradient(x)
+    x, force = section.displacement, section.force[section.shown]
+    v = np.gradient(x)
     top = float(np.percentile(np.abs(v), 99.0)) or 1.0
     rounded = [np.tanh(v / (share * top)) for share in SIGMOIDS]
-    columns = [np.ones(x.size), x - x.mean(), np.gradient(v), v, np.abs(v), v * np.abs(v), *rounded]
-    design = np.stack([column / (np.linalg.norm(column) or 1.0) for column in columns], axis=1)
+    laws = [np.ones(x.size), x - x.mean(), np.gradient(v), v, np.abs(v), v * np.abs(v), *rounded]
+    design = np.stack([law / (np.linalg.norm(law) or 1.0) for law in laws], axis=1)[section.shown]
     rest = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
-    return float(np.sum(rest**2) / max(np.sum((force - force.mean()) ** 2), 1e-300))
-
-
-# --- Reference fit of a Bingham element ---
-
-MOST_SAMPLES = 800
-"""Samples of the section at most: enough for the shape of its loops."""
-RATE = 250.0
-"""A record without cycles is read at about this rate [Hz]."""
-LEAST_RESIDUAL = 2e-3
-"""Share of the force's squares worth explaining: less is noise, or how coarse the element is."""
-RIGID = 3e-4
-"""Least T0 / k that is tried, as a share of half the stroke: the flank of a rigid damper takes one sample."""
-_GRID = (28, 16)
-"""Values of T0 / k and of C / k in the first search, each 30 to 50 % above the last."""
-_ZOOM = (7, 7)
-_ZOOMS = 4
-"""Each zoom divides the steps by three: four of them leave 0.3 to 0.5 %, finer than the element is true."""
-
-
-@dataclass(frozen=True, eq=False)
-class Section:
-    """Section of a record that the reference is fitted to: its average cycle, or its beginning."""
-
-    step: float
-    """Sampling interval [s]."""
-    displacement: Array
-    """(n,) [m]"""
-    delayed: Callable[[Array], Array]
-    """Delays (m,) [s] -> the force (m, n) read that much later [N]."""
-    periodic: bool
-    """Whether the end joins the beginning."""
-
-
-@dataclass(frozen=True)
-class ReferenceFit:
-    """Element of least squares over several forces."""
-
-    residual: float
-    """Share of the best fitted force's squares about its mean that is left."""
-    residual_without_element: float
-    """The same of offset, spring and inertia alone."""
-    number: int
-    """Index of the force that fits best."""
-    friction_extension: float
-    """T0 / k [m]."""
-    lag: float
-    """C / k [s]."""
-
-    def explains(self) -> bool:
-        """Whether the element takes more than half of a visible residual; else its parameters mean nothing."""
-        return self.residual_without_element > LEAST_RESIDUAL and self.residual < 0.5 * self.residual_without_element
-
-
-_Grid = tuple[Sequence[tuple[float, float]], tuple[float, float], Array]
-"""Elements of many T0 / k [m] and C / k [s]: the (g,) pairs, the steps from one to the next in logarithms, and the
-forces (g, n) without offset, spring and inertia, of unit length."""
-
-
-@lru_cache(maxsize=1)
-def reference_fit(test: PreflightRecord) -> tuple[Section, ReferenceFit]:
-    """Fit the element to the undelayed force of a record; remembered, as both checks ask for it."""
-    section = _beginning(test) if test.cycles is None else _average_cycle(test, test.cycles)
-    return section, fit_element(section, section.delayed(np.zeros(1)))
-
-
-def _beginning(test: PreflightRecord) -> Section:
-    record = test.record
-    every = max(round(record.rate / RATE), 1)
-    rows = slice(0, every * MOST_SAMPLES, every)
-
-    def delayed(delays: Array) -> Array:
-        return np.stack([np.interp(record.time[rows] + delay, record.time, record.force) for delay in delays])
-
-    return Section(every / record.rate, test.clean.displacement[rows], delayed, periodic=False)
-
-
-def _average_cycle(test: PreflightRecord, cycles: Cycles) -> Section:
-    record = test.record
-    steady = test.clean.displacement - mean_over_period(record.time, test.clean.displacement, cycles)
-    x, force = cycles.mean(record.time, steady), cycles.mean(record.time, record.force)
-    every = -(-x.size // MOST_SAMPLES)
-    spectrum, harmonics = np.fft.rfft(force), np.arange(force.size // 2 + 1)
-
-    def delayed(delays: Array) -> Array:
-        turn = np.exp(2j * np.pi * np.outer(delays, harmonics) * cycles.frequency)
-        return np.asarray(np.fft.irfft(spectrum * turn, force.size, axis=1)[:, ::every])
-
-    return Section(every * cycles.period / x.size, x[::every], delayed, periodic=True)
-
-
-def fit_element(section: Section, forces: Array) -> ReferenceFit:
-    """Fit a Bingham element beside a free offset, spring and inertia, by a grid search that zooms in.
-
-    Parameters
-    ----------
-    section : the displacement
-    forces : (m, n) [N]; the fit is that of the force that is explained best
-    """
-    free = _free_terms(section.displacement)
-    rest = _projected_out(forces, free)
-    targets = _normalised(rest)
-    centred = forces - forces.mean(axis=1, keepdims=True)
-    unexplained: Array = np.sum(rest**2, axis=1) / np.maximum(np.sum(centred**2, axis=1), 1e-300)
-
-    def closest(elements: Array) -> tuple[int, int, float]:
-        """Return the indices of the best element and force, and the share of the squares that is left."""
-        left = unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
-        element, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
-        return element, force, float(left[element, force])
-
-    pairs, steps, elements = _first_grid(section)
-    element, force, left = closest(elements)
-    for _ in range(_ZOOMS):
-        spans = [(np.log(v) - step, np.log(v) + step) for v, step in zip(pairs[element], steps, strict=True)]
-        pairs, steps, elements = _grid(section, spans, _ZOOM)
-        element, force, left = closest(elements)
-    return ReferenceFit(left, float(unexplained[force]), force, *pairs[element])
-
-
-@lru_cache(maxsize=1)
-def _first_grid(section: Section) -> _Grid:
-    """Every element that a record may show; remembered, as both fits of a record begin with it."""
-    half = 0.5 * float(np.ptp(section.displacement))
-    longest = max(2.0 * section.step, min(0.1, 0.1 * section.step * section.displacement.size))
-    spans = [(np.log(RIGID * half), np.log(0.7 * half)), (np.log(0.2 * section.step), np.log(longest))]
-    return _grid(section, spans, _GRID)
-
-
-def _grid(section: Section, spans: Sequence[tuple[float, float]], counts: tuple[int, int]) -> _Grid:
-    """Elements between the logarithms of two values each."""
-    frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
-    pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
-    forces = _projected_out(forces_per_stiffness(section, pairs), _free_terms(section.displacement))
-    return pairs, (float(frictions[1] - frictions[0]), float(lags[1] - lags[0])), _normalised(forces)
-
-
-def forces_per_stiffness(section: Section, pairs: Sequence[tuple[float, float]]) -> Array:
-    """Compute forces (g, n) of elements over their stiffness [m], in the second pass where the motion is periodic.
-
-    Parameters
-    ----------
-    section : the displacement
-    pairs : g of T0 / k [m] and C / k [s]
-    """
-    x = section.displacement
-    passes = np.concatenate((x, x)) if section.periodic else x
-    elements = np.column_stack([np.array(pairs), np.ones(len(pairs))])
-    return element_forces(passes, section.step, elements)[:, -x.size :]
-
-
-def _free_terms(x: Array) -> Array:
-    """Orthonormal columns (n, 3) of offset, spring and inertia."""
-    bend = np.gradient(np.gradient(x))
-    return np.asarray(np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0])
-
-
-def _projected_out(forces: Array, free: Array) -> Array:
-    """Rows (m, n) without their offset, spring and inertia."""
-    return np.asarray(forces - (forces @ free) @ free.T)
-
-
-def _normalised(rows: Array) -> Array:
-    """Rows (m, n) of unit length."""
-    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300))
+    return float(np.sum(rest**2)) / section.squares
 
 
 CHECKS = (offset, delay)

@@ -1,0 +1,175 @@
+"""Checks of what an amplifier or a logger does to the whole force: a low-pass, soft saturation, a range that ends.
+
+Each holds a reference that the channel shows so against the same reference as it is. A damper that lacks a law may
+look alike in one record: what is found says what else it may be, and a low-pass whose corner differs from record to
+record is none. A viscous damper alone behind a low-pass of first order is one on an oil spring, of k = 2 pi f C, to the
+last digit: there nothing can be found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import butter, lfilter, lfilter_zi
+
+from pzd.artefacts import Finding, RecordEntry
+from pzd.record import Array, is_constant, voltage_scale
+from pzd.rig.preflight import PreflightRecord
+from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, sampled_fit
+from pzd.rig.preflight.sensors import coarse_step
+
+WORTH = 3e-4
+"""Share of the force's squares from which something is left to explain; the grid of the reference leaves a tenth."""
+EXPLAINS = 0.25
+"""What the channel does has to leave less than this share of what the reference leaves without it."""
+
+
+def amplifier(test: PreflightRecord) -> Iterator[Finding]:
+    """Find what a channel does to the whole force, where it explains most of what the reference leaves."""
+    if not is_constant(test.record, voltage_scale([test.record])) or coarse_step(test.record.displacement):
+        return
+    section, plain = sampled_fit(test)
+    if plain.residual < WORTH:
+        return
+    found = [_low_pass(section, plain, test.cycles.frequency if test.cycles else 1.0), _saturation(section)]
+    left, finding = min(found, key=lambda one: one[0])
+    if finding is not None and left < EXPLAINS * plain.residual:
+        yield finding
+
+
+# --- A low-pass of the force ---
+
+ORDERS = (1, 2)
+"""Of the low-pass: an RC circuit; Butterworth's of second order, which stands for steeper ones too."""
+CORNERS = 8
+"""Corners that are tried at first, from the motion's frequency to a tenth of the rate."""
+CLOSER = 7
+"""Corners and delays that are tried about the best one."""
+DELAYS = (-1.0, -0.5, 0.0, 0.5)
+"""Delays beside the low-pass, as shares of its own: -1 where it runs both ways, or the displacement has one too."""
+ALIKE_CORNERS = 2.0
+"""Corners further apart than this factor are no amplifier's;"""
+LEAST_RECORDS = 1.0 / 3.0
+"""nor is what fewer than this share of the records show: only a force without friction hides it."""
+
+
+def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[float, Finding | None]:
+    """Fit a low-pass of the force behind the element; of itself that turns within a sample, or an oil spring's travel.
+
+    Equation: F = H(s) (F_0 + k f(T0/k, C/k) + c_1 x + c_2 a), H Butterworth's     Source: least squares
+
+    Parameters
+    ----------
+    section, plain : the samples, and the reference without a low-pass
+    slowest : least corner [Hz]
+
+    Returns
+    -------
+    the share of the squares that is left, and what to say of it
+    """
+    corners = np.geomspace(slowest, max(0.1 / section.step, 2.0 * slowest), CORNERS)
+    tried = [(_behind(section, order, corner), order, corner) for order in ORDERS for corner in corners]
+    best, order, corner = min(tried, key=lambda one: one[0].residual)
+    if best.residual > 2.0 * EXPLAINS * plain.residual:
+        return best.residual, None
+    nearer = corner * (corners[1] / corners[0]) ** np.linspace(-1.0, 1.0, CLOSER)
+    best, corner = min(((_behind(section, order, one, 2), one) for one in nearer), key=lambda one: one[0].residual)
+    return best.residual, Finding(
+        check="filter",
+        where=f"force, the whole record, as behind a low-pass of {'first' if order == 1 else 'second'} order",
+        size=float(corner),
+        unit="Hz",
+        follows=f"it takes {1.0 - best.residual / plain.residual:.0%} of what a Bingham element leaves; not corrected, "
+        "and k is too low: record the force without the filter, or every channel through the same one",
+    )
+
+
+def _behind(section: Section, order: int, corner: float, zooms: int = 1) -> ReferenceFit:
+    """Fit the element behind a low-pass."""
+    b, a = butter(order, min(2.0 * corner * section.step, 0.9))
+    start = lfilter_zi(b, a)
+
+    def passed(rows: Array) -> Array:
+        return np.asarray(lfilter(b, a, rows, axis=1, zi=rows[:, :1] * start)[0])
+
+    own = order**0.5 / (2.0 * np.pi * corner)
+    return fit_element(replace(section, passed=passed), section.delayed(own * np.array(DELAYS)), zooms)
+
+
+def drop_contradicting_filters(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """Drop the low-passes of a rig whose records ask for different ones, or most for none: a law that is missing."""
+    corners = [finding.size for entry in entries for finding in entry.findings if finding.check == "filter"]
+    if not corners or (max(corners) <= ALIKE_CORNERS * min(corners) and len(corners) >= LEAST_RECORDS * len(entries)):
+        return entries
+    return tuple(
+        entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "filter")})
+        for entry in entries
+    )
+
+
+# --- A force that grows less the larger it is ---
+
+SATURATES_AT = (1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0)
+"""Where a soft amplifier saturates, as multiples of the largest force that it shows."""
+CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.35)
+"""Shares of the samples, at either end, that may be cut off: of more, friction alone is flat too."""
+LEAST_CUT = 0.03
+"""Least share of the force shown that is missing at the peak."""
+
+
+def _saturation(section: Section) -> tuple[float, Finding | None]:
+    """Fit a force that bends over or is cut off near its peaks, with noise on top of it.
+
+    Equation: F = F_s tanh(f / F_s), or F = f between two limits, f the element beside offset, spring, inertia
+    Source: least squares
+
+    Parameters
+    ----------
+    section : the samples
+
+    Returns
+    -------
+    the share of the squares that is left, and what to say of it
+    """
+    peak = float(np.abs(section.force).max())
+    soft = [(*_bent(section, share * peak), False) for share in SATURATES_AT]
+    hard = [(*_cut(section, share), True) for share in CUT_SHARES]
+    left, missing, cut = min(soft + hard)
+    if missing < LEAST_CUT * peak:
+        return left, None
+    return left, Finding(
+        check="range",
+        where=f"force, {'cut off' if cut else 'bends over'} near {peak:.4g} N, with noise on top",
+        size=missing,
+        unit="N",
+        follows="so much is missing at the peak, and of C as well, if the amplifier saturates; where a larger range "
+        "shows the same, the damper itself gives way (relief valve, shear thinning)",
+    )
+
+
+def _bent(section: Section, limit: float) -> tuple[float, float]:
+    """Return the share of the squares left by a soft amplifier of a limit [N], and what is missing at the peak [N]."""
+    shown = np.clip(section.force / limit, -0.9999, 0.9999)
+    straight = limit * np.arctanh(shown)
+    fit = fit_element(replace(section, weights=1.0 - shown**2), straight[None], 2)
+    return fit.residual, float(np.abs(straight).max() - np.abs(section.force).max())
+
+
+def _cut(section: Section, share: float) -> tuple[float, float]:
+    """Return the share of the squares left where so many samples are cut off at each end, and what is missing [N]."""
+    force = section.force
+    low, high = np.quantile(force[section.shown], (share, 1.0 - share))
+    ends = [section.shown & (force >= high), section.shown & (force <= low)]
+    between = replace(section, shown=section.shown & (force < high) & (force > low))
+    fit = fit_element(between, force[None], 2)
+    design = columns(between, fit)
+    whole = design @ np.linalg.lstsq(design[between.shown], force[between.shown], rcond=None)[0]
+    flat = sum(float(np.sum((force[rows] - np.median(force[rows])) ** 2)) for rows in ends)
+    missing = min(float(np.max(sign * (whole - force)[rows])) for sign, rows in zip((1.0, -1.0), ends, strict=True))
+    return (fit.residual * between.squares + flat) / section.squares, missing
+
+
+CHECKS = (amplifier,)
+COMPARISONS = (drop_contradicting_filters,)
