@@ -29,7 +29,7 @@ from pzd.report.blocks import (
     spelled,
 )
 from pzd.report.columns import Cell, Column, Table
-from pzd.report.drawing import AXIS, Panel, axes_with_difference, encoded, legend, styled
+from pzd.report.drawing import AXIS, Panel, axes, axes_with_difference, encoded, legend, styled
 from pzd.report.page import render
 from pzd.simulate.study.plan import PLAIN_SUFFIX
 
@@ -133,7 +133,7 @@ class _Matched:
     def words(self) -> str:
         parts = [amount(self.voltage, self.unit)] if self.voltage is not None else []
         parts += [amount(self.temperature, "degC")] if self.temperature is not None else []
-        return ", ".join(parts) or "all records"
+        return ", ".join(parts) or "one condition"
 
 
 def _matched(runs: Sequence[ComparedRun], rows_of: Callable[[ComparedRun], Sequence[Any]]) -> list[_Matched]:
@@ -251,7 +251,9 @@ def _cards(runs: Sequence[ComparedRun], tables: Sequence[Table]) -> Iterator[Car
                 largest = max(known, key=abs, default=None)
                 by = "" if largest is None else f" (up to {'+' * (largest > 0.0)}{percent(largest)})"
                 differing.append(f"{table.title}{by}")
-        answer = listed(differing) if differing else "Nothing beyond the intervals"
+        known_in_both = any(beyond(row.value(first), row.value(run.name)) is not None for t in tables for row in t.rows)
+        nothing = "Nothing beyond the intervals" if known_in_both else "No parameter is known of both"
+        answer = listed(differing) if differing else nothing
         yield Card(f"Where does {run.name} differ from {first}?", answer, _largest(runs[0], run))
     for run in runs:
         if run.diagnosis is not None:
@@ -344,8 +346,12 @@ def _difference(place: _Matched, first: str, other: str) -> Array:
 
 def _curves(runs: Sequence[ComparedRun], place: _Matched) -> Panel:
     present = [(run, colour) for run, colour in zip(runs, _colours(len(runs)), strict=True) if run.name in place.rows]
-    figure, upper, lower = axes_with_difference("velocity [m/s]", "force [kN]", "difference [N]", key=len(present))
-    lower.axhline(0.0, color=AXIS, linewidth=0.8)
+    if len(present) == 1:
+        figure, upper = axes("velocity [m/s]", "force [kN]", height=3.9)
+        lower = upper
+    else:
+        figure, upper, lower = axes_with_difference("velocity [m/s]", "force [kN]", "difference [N]", key=len(present))
+        lower.axhline(0.0, color=AXIS, linewidth=0.8)
     first = present[0][0].name
     told = []
     for number_, (run, colour) in enumerate(present):
@@ -361,7 +367,8 @@ def _curves(runs: Sequence[ComparedRun], place: _Matched) -> Panel:
                 told.append(f"{run.name} by up to {amount(float(np.nanmax(np.abs(apart))), 'N')}")
     legend(figure, 1)
     differs = f"; {listed(told)} from {first}" if told else ""
-    caption = f"{number(len(present))} of {len(runs)} runs have this condition." if len(present) < len(runs) else ""
+    some = "No other run has it." if len(present) == 1 else f"{len(present)} of {len(runs)} runs have it."
+    caption = some if len(present) < len(runs) else ""
     return Panel(figure, place.words, f"Force over velocity at {place.words}{differs}.", caption)
 
 

@@ -136,8 +136,10 @@ def test_a_run_without_a_table_is_told_by_its_parameters_alone() -> None:
     other = compared("b", 330.0)
     bare = ComparedRun("b", other.control, other.parameters, None, None, (), (), ())
     page = text_of(compared("a", 300.0), bare)
-    assert "1 of 2 runs have this condition" in page
+    assert "No other run has it." in page
     assert "T0 (up to +10 %)" in page
+    curve = ComparedRun("curve", other.control, (), None, None, other.force, (), ())
+    assert "No parameter is known of both" in text_of(bare, curve)
     assert "No run has a table of force" in text_of(bare, ComparedRun("c", bare.control, (), None, None, (), (), ()))
 
 
