@@ -11,7 +11,19 @@ import numpy as np
 from pzd.artefacts import Diagnosed, Identified, MountedDamper, MountedDampers, Report, Rides, Rig, damper_without_force
 from pzd.force_table.lookup import Lookup
 from pzd.quantities import Control
-from pzd.report.blocks import Block, Card, Gallery, Notes, Opening, Paragraph, Section, TextTable, amount, percent
+from pzd.report.blocks import (
+    Block,
+    Card,
+    Gallery,
+    Notes,
+    Opening,
+    Paragraph,
+    Section,
+    TextTable,
+    amount,
+    percent,
+    typewritten,
+)
 from pzd.report.columns import Column, Table
 from pzd.report.config import ReportConfig
 from pzd.report.context import ReportContext
@@ -74,7 +86,8 @@ def report_mounted(
         RatedRides(ratings, comfort, simulate, control),
         reference,
     )  # fmt: skip
-    return Report(comfort=comfort, page=_page(context, mounted, jobs), reference=reference)
+    words = (typewritten(_answer(mounted)),)
+    return Report(comfort=comfort, page=_page(context, mounted, jobs), reference=reference, answer=words)
 
 
 def _page(context: ReportContext, mounted: MountedDampers, jobs: int) -> str:
