@@ -55,6 +55,17 @@ class MountedDampers:
         return all(row.voltage_V is not None for row in self.axles[0].table.force)
 
     @property
+    def by_curve(self) -> bool:
+        """Whether one of them is known by its curve alone, so that all are ridden by their tables."""
+        return any(axle.damper is None for axle in self.axles)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that every damper has."""
+        each = [set(axle.damper.effects) if axle.damper else set() for axle in self.axles]
+        return tuple(sorted(set.intersection(*each)))
+
+    @property
     def named_axles(self) -> tuple[tuple[str, MountedDamper], ...]:
         """The dampers with the name of their axle, which is empty where both axles have the same."""
         return tuple(zip(("front", "rear") if len(self.axles) > 1 else ("",), self.axles, strict=True))

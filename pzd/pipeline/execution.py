@@ -162,7 +162,7 @@ class Pipeline:
 
     def _not_followed(self, artefact: Artefact, state: StageFolder) -> tuple[str, ...]:
         """Return which rides do not follow a table that was edited by hand: those on the law of the damper itself."""
-        with_law = isinstance(artefact, MountedDampers) and all(axle.damper for axle in artefact.axles)
+        with_law = isinstance(artefact, MountedDampers) and not artefact.by_curve
         if not (self.config.car and "dynamic" in self.config.simulate.fidelities):
             return ()
         if not (isinstance(artefact, Table) or with_law):

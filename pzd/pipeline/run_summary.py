@@ -217,11 +217,14 @@ def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
             found.folder, found.control, (), None, found.summary, found.comfort, found.page, found.marks
         )
         found = replace(nothing, mounted=_mounted_of(given))
-    effects = found.diagnosis.effects if found.diagnosis else ()
-    with_voltage = (
-        found.mounted.controlled if found.mounted else all(row.voltage_V is not None for row in found.parameters)
-    )
+    ride = given.config.simulate
+    if found.mounted is not None:
+        ride = ride.by_tables() if found.mounted.by_curve else ride
+        effects, with_voltage = found.mounted.effects, found.mounted.controlled
+    else:
+        effects = found.diagnosis.effects if found.diagnosis else ()
+        with_voltage = all(row.voltage_V is not None for row in found.parameters)
     if not given.config.car:  # rides that an earlier config left in the folder are none of this run
         found = replace(found, summary=(), comfort=())
-    lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
+    lines = assumed(ride, effects, with_voltage) if found.summary else ()
     return replace(found, stale=stale_stages(given), assumed=lines)

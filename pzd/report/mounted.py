@@ -103,7 +103,8 @@ def _page(context: ReportContext, mounted: MountedDampers, jobs: int) -> str:
     title = "Dampers and comfort report" if context.ridden else "Damper report"
     about = tuple((name, str(value)) for name, value in context.config.about.items())
     opening = Opening(_answer(mounted), tuple(picture for row in drawn["answer"] for picture in row), about)
-    lines = assumed(context.simulate, (), mounted.controlled) if context.ridden else ()
+    ride = context.simulate.by_tables() if mounted.by_curve else context.simulate
+    lines = assumed(ride, mounted.effects, mounted.controlled) if context.ridden else ()
     return render(title, tuple(_cards(context, mounted)), lines, sections, opening=opening)
 
 
@@ -247,7 +248,7 @@ def _limits(context: ReportContext, mounted: MountedDampers) -> Section:
 
 
 def _limits_of(context: ReportContext, mounted: MountedDampers) -> Iterator[str]:
-    if any(axle.damper is None for axle in mounted.axles):
+    if mounted.by_curve:
         yield (
             "a curve knows neither an oil spring nor a valve nor any effect of frequency: its damper answers at once, "
             "and the rides are by the tables (fidelity table) whatever the config asks for"

@@ -331,6 +331,11 @@ class SimulateConfig(Frozen):
             return None
         return self.c_min_Ns_per_m, self.c_max_Ns_per_m
 
+    def by_tables(self) -> SimulateConfig:
+        """Return the block for dampers that are known by their tables alone: `table` in the place of `dynamic`."""
+        fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in self.fidelities))
+        return self.model_copy(update={"fidelities": fidelities})
+
     def is_controlled(self, policy: str) -> bool:
         """Tell whether a policy is the controlled one that the report sets beside the others."""
         names = [name for name in self.policies or () if policies()[name].controlled]

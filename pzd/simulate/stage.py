@@ -112,8 +112,7 @@ def simulate_on_axles(
     if config.histories == "parquet":
         check_installed("simulate.histories")
     if any(damper is None for damper, _ in axles):
-        fidelities = tuple(dict.fromkeys("table" if one == "dynamic" else one for one in simulate.fidelities))
-        config = simulate.model_copy(update={"fidelities": fidelities})
+        config = simulate.by_tables()
     for damper, table in axles:
         controlled.append(all(row.voltage_V is not None for row in table.force))
         checked_voltage(config, table)
