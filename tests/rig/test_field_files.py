@@ -119,6 +119,21 @@ FILES = {
     "exponents of Fortran": FieldFile(
         HEAD + rows(*([f"{v:.12E}".replace("E", "D") for v in one] for one in (TIME, 1e3 * X, FORCE)))
     ),
+    "words below the table": FieldFile(f"{HEAD}{TABLE}\nEnd of test\n"),
+    "strokes between the fields": FieldFile((HEAD + TABLE).replace(",", "|")),
+    "UTF-16 without its mark": FieldFile(HEAD + TABLE, "utf-16-le"),
+    "Chinese units below": FieldFile(
+        "\u65f6\u95f4,\u4f4d\u79fb,\u529b\u503c\n\u79d2,\u6beb\u7c73,\u725b\n" + TABLE, "gbk"
+    ),
+    "kiloponds": FieldFile(
+        "Zeit [s];Weg [cm];Kraft [kp]\n"
+        + rows(TIME, 1e2 * X, 1e-3 * FORCE / GRAM, separator=";", decimal=",")
+    ),
+    "blanks between the fields and in the headers": FieldFile(
+        "   Running Time   Axial Position      Axial Force\n            sec               mm                N\n"
+        + "".join("".join(f"{v:17.9f}" for v in row) + "\n" for row in zip(TIME, 1e3 * X, FORCE, strict=True))
+    ),
+    "blanks before the units too": FieldFile("Time [s] Pos [mm] Force [N]\n" + TABLE.replace(",", " ")),
     "dates with the time of day": FieldFile(
         "Timestamp,Position (mm),Force (N)\n"
         + rows([f"2024-03-02 10:15:{t:09.6f}" for t in TIME], 1e3 * X, FORCE)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pzd.schema.errors import DataError, FilesError, at
 
-SEPARATORS = (",", ";", "\t")
+SEPARATORS = (",", ";", "\t", "|")
 """Separators that are recognised from the header line."""
 KINDS = (
     (b"PK\x03\x04", "a zip archive"),
@@ -41,8 +41,24 @@ def text_of(path: Path, encoding: str) -> str:
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text:
-        raise DataError(f"{at(path, text[: text.index(chr(0))].count(chr(10)) + 1)}: not a text file (a zero byte)")
+        wide = without_mark(raw)
+        hint = f"; it is text in {wide}: say encoding: {wide}" if wide else ""
+        line = text[: text.index(chr(0))].count(chr(10)) + 1
+        raise DataError(f"{at(path, line)}: not a text file (a zero byte){hint}")
     return text
+
+
+def without_mark(raw: bytes) -> str | None:
+    """Return the encoding of UTF-16 text that does not begin with its mark; None where it is none.
+
+    The characters of a table are ASCII for the most part, of which every second byte is zero.
+    """
+    start = raw[:4096]
+    zeros = start[0::2].count(0), start[1::2].count(0)
+    half = 0.5 * len(start) / 2.0
+    if zeros[1] > half and zeros[0] == 0:
+        return "utf-16-le"
+    return "utf-16-be" if zeros[0] > half and zeros[1] == 0 else None
 
 
 def text_bytes(path: Path) -> bytes:

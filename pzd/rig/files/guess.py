@@ -142,7 +142,17 @@ class SniffedFile:
         """Key that is equal for files that one entry can read."""
         d = self.dialect
         kind = [_date_format(cell) for cell in d.first]
-        return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, d.headless, tuple(kind)
+        return (
+            self.form,
+            d.header,
+            d.units,
+            d.separator,
+            d.decimal,
+            d.skip,
+            d.encoding,
+            d.headless or d.apart,
+            tuple(kind),
+        )
 
 
 def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
@@ -294,6 +304,8 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield f"skip: {dialect.skip}"
     if dialect.separator in (" ", dialect.decimal):
         yield f'separator: "{dialect.separator}"'
+    if dialect.apart:
+        yield f"header: [{', '.join(map(written, dialect.header))}]    # blanks stand in the headers of the file"
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
     if dialect.decimal == ",":

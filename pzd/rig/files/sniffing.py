@@ -31,12 +31,12 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes, without_mark
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
 from pzd.rig.files.one_clock import headers_together
 from pzd.rig.files.sheet import Wanted, spelled
-from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
+from pzd.rig.files.units import SPELLINGS, UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 
 # --- Quantity of a column, by its header in English, German, French, Spanish, Italian, Polish, Chinese or Japanese ---
@@ -249,6 +249,8 @@ class Dialect:
     """Lines above the header."""
     units_row: bool = False
     """Whether the units are in a row below the header."""
+    apart: bool = False
+    """Whether blanks separate the rows, and stand within the headers too: the config names the headers then."""
     headless: bool = False
     """Whether the file has no headers; those here are made up."""
 
@@ -267,7 +269,7 @@ class Dialect:
         split : how it is cut into tests
         """
         options: dict[str, Any] = {"skip": self.skip, "units_row": self.units_row}
-        if self.headless:
+        if self.headless or self.apart:
             options["header"] = self.header
         if form == TEXT:
             options |= {"separator": self.separator, "decimal": self.decimal, "encoding": self.encoding}
@@ -324,7 +326,46 @@ def _sniffed_as(raw: bytes, encoding: str) -> Dialect | None:
     readings = [(s, d) for s in (*SEPARATORS, BLANKS) for d in ".," if s != d or quoted]
     tables = [_table([_fields(line, reading[0]) for line in lines], encoding, *reading) for reading in readings]
     found = [table for table in tables if table is not None]
-    return max(found, key=lambda rated: rated[0])[1] if found else None
+    best = max(found, key=lambda rated: rated[0])[1] if found else None
+    if best is not None and _of_a_rig(best):
+        return best
+    apart = _names_apart(lines, encoding)
+    return apart if apart is not None and _of_a_rig(apart) else best
+
+
+def _of_a_rig(dialect: Dialect) -> bool:
+    """Whether the headers name displacement and force."""
+    return {DISPLACEMENT, FORCE} <= set(assigned(dialect.header, dialect.units, control_of(dialect.header)))
+
+
+_WIDE_BLANKS = re.compile(r"\s{2,}|\t")
+_NAME_AND_UNIT = re.compile(r"[^\[\]()]+[\[(][^\])]*[\])]")
+
+
+def _names_apart(lines: Sequence[str], encoding: str) -> Dialect | None:
+    """Guess the headers above rows that blanks separate, where the headers hold blanks: `Axial Force`, `Pos [mm]`.
+
+    They end at two blanks or more, or behind a unit in brackets.
+    """
+    for decimal in ".,":
+        rows = [line.split() for line in lines]
+        whole = [len(row) > 2 and _numbers(row, decimal) == len(row) for row in rows]
+        starts = (n for n in range(1, len(rows) - 1) if whole[n] and whole[n + 1] and len(rows[n]) == len(rows[n + 1]))
+        first = next(starts, None)
+        if first is None or whole[first - 1]:
+            continue
+        above = [n for n in range(first) if rows[n]][-2:]
+        width = len(rows[first])
+        below = rows[above[-1]] if len(above) > 1 and all(_UNIT.fullmatch(cell) for cell in rows[above[-1]]) else []
+        line = lines[above[0] if len(below) == width else above[-1]].strip()
+        ways = (_WIDE_BLANKS.split(line), [name.strip() for name in _NAME_AND_UNIT.findall(line)])
+        names = next((way for way in ways if len(way) == width), None)
+        if names is None:
+            continue
+        if len(below) == width:
+            names = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(names, below, strict=True)]
+        return Dialect(tuple(names), None, tuple(rows[first]), encoding, BLANKS, decimal, skip=first, apart=True)
+    return None
 
 
 def _fields(line: str, separator: str) -> list[str]:
@@ -349,6 +390,8 @@ def _encodings(raw: bytes) -> tuple[str, ...]:
     """Return the encodings that a text may be in."""
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return ("utf-16",)
+    if wide := without_mark(raw):
+        return (wide,)
     return tuple(page for page in _CODE_PAGES if _reads(raw, page)) if not _reads(raw, "utf-8") else ("utf-8",)
 
 
@@ -393,7 +436,11 @@ def _table(
         rows = [row[:width] for row in rows]
     below = rows[first - 1]
     units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])
-    units = units and any(below) and all(_UNIT.fullmatch(cell) for cell in below if cell)
+    units = (
+        units
+        and any(below)
+        and all(_UNIT.fullmatch(cell) or cell.strip("[]() ") in SPELLINGS for cell in below if cell)
+    )
     top = first - 1 - units
     if len(rows[top]) != width:
         return None

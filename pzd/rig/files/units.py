@@ -29,7 +29,7 @@ _ABOUT = re.compile(
 )
 """A unit, and the reading of the recorder that means zero."""
 _IN_BRACKETS = re.compile(r"[\[(\uff08\u3010]\s*([^\[\]()\uff08\uff09\u3010\u3011]+?)\s*[\])\uff09\u3011]\s*$")
-_LOGGERS = {
+SPELLINGS = {
     "Sec": "s",
     "sec": "s",
     **dict.fromkeys(("Volts", "Volt"), "V"),
@@ -43,6 +43,17 @@ _LOGGERS = {
     "deg_C": "degC",
     **dict.fromkeys(('"', "''", "\u2033", "\u201d"), "inch"),
     **dict.fromkeys(("'", "\u2032", "\u2019"), "foot"),
+    **dict.fromkeys(("kp", "\u516c\u65a4\u529b"), "kgf"),
+    "\u79d2": "s",
+    **dict.fromkeys(("\u6beb\u79d2", "\u30df\u30ea\u79d2"), "ms"),
+    **dict.fromkeys(("\u6beb\u7c73", "\u30df\u30ea"), "mm"),
+    "\u5398\u7c73": "cm",
+    "\u7c73": "m",
+    **dict.fromkeys(("\u725b", "\u725b\u987f", "\u30cb\u30e5\u30fc\u30c8\u30f3"), "N"),
+    "\u5343\u725b": "kN",
+    **dict.fromkeys(("\u4f0f", "\u4f0f\u7279", "\u30dc\u30eb\u30c8"), "V"),
+    **dict.fromkeys(("\u5b89", "\u5b89\u57f9", "\u30a2\u30f3\u30da\u30a2"), "A"),
+    **dict.fromkeys(("\u2103", "\u6444\u6c0f\u5ea6"), "degC"),
 }
 """Spellings of loggers that pint does not know, or takes for other units: the `lbs` of a rig are pounds of force."""
 LONGEST = 40
@@ -170,7 +181,7 @@ def _parsed(unit: str) -> pint.util.UnitsContainer:
     ------
     ValueError : when it is no product or quotient of names and their powers
     """
-    text = _LOGGERS.get(unit, unit).translate(_SUPERSCRIPTS).strip()
+    text = SPELLINGS.get(unit, unit).translate(_SUPERSCRIPTS).strip()
     if not text or len(text) > LONGEST:
         raise ValueError(f"a unit has at most {LONGEST} characters" if text else "it is empty")
     registry = _registry()
@@ -182,7 +193,7 @@ def _parsed(unit: str) -> pint.util.UnitsContainer:
         factor = _FACTOR_OF_UNIT.match(text, position)
         if factor is None or count == MOST_FACTORS:
             raise ValueError("products, quotients and powers of unit names are read, as in N s/m or m/s2")
-        name = registry.get_name(_LOGGERS.get(factor["name"], factor["name"]))
+        name = registry.get_name(SPELLINGS.get(factor["name"], factor["name"]))
         power = float(factor["broken"]) if factor["broken"] else int(factor["power"] or 1)
         powers *= registry.UnitsContainer({name: -power if over else power})
         position, count = factor.end(), count + 1

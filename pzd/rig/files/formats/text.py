@@ -11,7 +11,7 @@ import io
 import re
 from array import array
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,6 +86,8 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         )
     if numbers.size == 0:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
+    lines, below = _without_words_below(lines, len(header))
+    body, numbers = lines.body, lines.numbers
     uneven = lines.fields != len(header)
     trailing = 0
     if entry.split is not None and entry.split.event == header[-1]:
@@ -110,7 +112,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     sparse = {i: cells for i in faults if header[i] in wanted.held and (cells := table.sparse(i)) is not None}
     values, faults = values | sparse, {i: told for i, told in faults.items() if i not in sparse}
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    steps = tuple(_steps(entry, header, wanted, numbers, trailing))
+    steps = (*_steps(entry, header, wanted, numbers, trailing), *below)
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
 
 
@@ -224,6 +226,31 @@ def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_
             rows[row] = lines.separator.join([*cells[: width - 1], _EVENT_SEPARATOR.join(event)])
             uneven[row] = False
     return "\n".join(rows), uneven
+
+
+_WORDS_ALONE = re.compile(r"[^\d]*[^\W\d_][^\d]*")
+"""A line of words without a digit, as `End of test`."""
+
+
+def _without_words_below(lines: _Lines, width: int) -> tuple[_Lines, list[ReadingStep]]:
+    """Leave out what stands below the last row in words alone, in fewer fields than the header has."""
+    last = int(lines.fields.size)
+    if last <= _MOST_BELOW or lines.fields[-1] >= width:
+        return lines, []
+    rows = lines.body.rsplit("\n", _MOST_BELOW)[1:]
+    while rows and lines.fields[last - 1] < width and (_WORDS_ALONE.fullmatch(rows[-1]) or not rows[-1].strip()):
+        rows.pop()
+        last -= 1
+    count = int(lines.fields.size) - last
+    if not count:
+        return lines, []
+    kept = lines.body.rsplit("\n", count)[0]
+    told = ReadingStep("left out", None, f"{counted(count, 'line')} of words below the table", "")
+    return replace(lines, body=kept, numbers=lines.numbers[:last], fields=lines.fields[:last]), [told]
+
+
+_MOST_BELOW = 10
+"""Lines of words below a table; more are none."""
 
 
 def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_], int]:
