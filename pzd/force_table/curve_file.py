@@ -334,13 +334,25 @@ def _curve(file: _File, columns: _Columns) -> ForceCurve:
     if float(np.sum(forces * velocity[:, np.newaxis])) < 0.0:
         forces = -forces  # counted against the velocity
     sign = file.asked.sign or 1
-    return curve_of(sign * velocity, sign * forces, signals, 1)
+    return curve_of(*_at_rest(sign * velocity, sign * forces), signals, 1)
 
 
 def _converted(file: _File, index: int | None, quantity: Quantity) -> Array:
     if index is None:
         raise ValueError(f"{quantity.name}: no column holds it")
     return to_canonical(_cells(file, index), file.unit(index, quantity) or "", own_quantity(quantity, file.control))
+
+
+def _at_rest(velocity: Array, forces: Array) -> tuple[Array, Array]:
+    """Put two rows at rest to either side of it: the force of dry friction jumps there, as in a table of force."""
+    rest = np.flatnonzero(velocity == 0.0)
+    if rest.size != 2:
+        return velocity, forces
+    if np.array_equal(*forces[rest]):
+        return np.delete(velocity, rest[1]), np.delete(forces, rest[1], axis=0)
+    moved = velocity.copy()
+    moved[rest[np.argsort(forces[rest, 0])]] = -AT_REST, AT_REST
+    return moved, forces
 
 
 def _of_directions(speed: Array, forces: Array, signals: tuple[float, ...] | None) -> ForceCurve:

@@ -90,6 +90,14 @@ def test_friction_at_rest_of_both_directions_is_a_jump(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.at(np.array([-0.5, -AT_REST, AT_REST, 0.5]), 0.0), [-500.0, -40.0, 60.0, 900.0])
 
 
+def test_two_rows_at_rest_are_the_two_sides_of_a_jump(tmp_path: Path) -> None:
+    text = "velocity_m_per_s,force_N,inside\n-0.5,-500,1\n-0.0,-40,1\n0.0,60,1\n0.5,900,1\n"
+    found = read(tmp_path, text, sign=1)
+    np.testing.assert_allclose(found.at(np.array([-AT_REST, AT_REST, 0.5]), 0.0), [-40.0, 60.0, 900.0])
+    once = read(tmp_path, text.replace("-40", "0").replace(",60", ",0"), sign=1)
+    np.testing.assert_allclose(once.at(np.array([0.0, 0.5]), 0.0), [0.0, 900.0])
+
+
 WIDE = "v [m/s],F at 0 A [N],F at 0.5 A [N],F at 1 A [N]\n" + rows(VELOCITY, FORCE, 2.0 * FORCE, 4.0 * FORCE)
 LONG = "v [m/s],F [N],current [A]\n" + "".join(
     f"{v:g},{scale * f:g},{current:g}\n"
