@@ -175,7 +175,7 @@ def _compared(found: RunSummary, name: str) -> ComparedRun:
     chosen = read_yaml(run.config).data.get("setting")
     has = {kind for kind in (Diagnosed, Table) if run.stage_folder(kind.folder).manifest is not None}
     rows = tuple(row for row in found.parameters if chosen in (None, row.setting))
-    diagnosed = run.read(Diagnosed) if Diagnosed in has else None
+    diagnosed = run.read(Diagnosed) if Diagnosed in has and found.mounted is None else None
     return ComparedRun(
         name,
         found.control,
