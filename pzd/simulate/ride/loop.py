@@ -54,7 +54,7 @@ def _stays(control_spec: ControlSpec, control: Array) -> bool:
     return control_spec.aim == VOLTAGE and set_already
 
 
-@inlined
+@compiled
 def _choose_ends(y: Array, ride: RunningRide) -> None:
     """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
     model, control, workspace = ride
@@ -120,7 +120,7 @@ def scheduled(time: float, model: RideModel, axle: int) -> float:
     return float(model.control_spec.schedule[axle, place])
 
 
-@inlined
+@compiled
 def _wanted_voltage(time: float, ride: RunningRide, axle: int) -> float:
     """Return the voltage that the policy asks of an axle [V]; a force that it asks is noted."""
     model, control, workspace = ride
@@ -201,7 +201,7 @@ def records_of(rows: int, per_output: int) -> Records:
     return Records(np.zeros((rows, COURSE_COLUMNS)), np.zeros((-(-rows // per_output), COLUMNS)), np.zeros(4))
 
 
-@inlined
+@compiled
 def beyond_reach(ride: RunningRide) -> bool:
     """Tell whether a damper moves faster than the rig did at its voltage, or farther than it did in any test.
 
@@ -225,7 +225,7 @@ def beyond_reach(ride: RunningRide) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _note(time: float, y: Array, ride: RunningRide, row: Array) -> None:
     """Fill one row of the history."""
     model, control, workspace = ride
@@ -298,7 +298,7 @@ def ride_steps(
     tally[NEXT_PIECE] = dt
 
 
-@inlined
+@compiled
 def _start(y: Array, ride: RunningRide, scratch: Array) -> None:
     """Find to which side each axle sets off, or that it sticks."""
     model, control, workspace = ride
