@@ -6,7 +6,6 @@ import io
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -115,10 +114,3 @@ def test_the_play_of_a_damper_driven_by_a_current_is_one_of_the_current() -> Non
         content = replace(content_of(damper), control=control)
         effects = json.loads(formats()["json"].files(content)["my-run.json"])["effects"]["columns"]
         assert (effects["effect"], effects["unit"]) == (["piezo_hysteresis"], [unit])
-
-
-def test_every_format_is_in_the_page_of_the_configs_and_no_other(root: Path) -> None:
-    text = (root / "configs" / "README.md").read_text(encoding="utf-8")
-    section = text.partition("## What is written for other tools")[2].partition("\n## ")[0]
-    cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
-    assert sorted(name for cell in cells for name in re.findall(r"`([^`]+)`", cell)) == sorted({*formats()} | {"--to"})
