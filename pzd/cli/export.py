@@ -41,13 +41,34 @@ Out = Annotated[
 ]
 
 
+Certify = Annotated[
+    bool,
+    typer.Option(
+        "--certify",
+        help="Run what is exported beside pzd on the records of the run, and write the certificate with it: how far "
+        "the forces are apart at most, where, and the versions.",
+    ),
+]
+
+ToDrive = Annotated[
+    str | None,
+    typer.Option(
+        "--waveform",
+        metavar="BLOCK",
+        help="What drives the stand with --to drive, as under `tests` of a virtual stand: "
+        "'{kind: sine, frequency_Hz: 2, amplitude_m: 0.01}'; by default the test that diagnose asks for next.",
+        show_default=False,
+    ),
+]
+
+
 @on_config("as_json")
-def export(call: Call, to: To, out: Out = None) -> int:
+def export(call: Call, to: To, out: Out = None, certify: Certify = False, waveform: ToDrive = None) -> int:
     """Write the damper of a run in the form that another tool takes."""
     from pzd.pipeline.exporting import LAST, exported
 
     (form,) = to
-    written = exported(call.opened, form, out, call.command_line(LAST))
+    written = exported(call.opened, form, out, call.command_line(LAST), certify, waveform)
     if call.output.as_json:
         files = [path.as_posix() for path in written.files]
         call.output.say_json({"format": form, "files": files, "not_to_be_trusted": written.marks})

@@ -20,6 +20,7 @@ import numpy as np
 from pzd.artefacts import ForceRow, InverseRow, Table
 from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow, Damper
+from pzd.export.drive import Drive
 from pzd.force_table.lookup import Lookup
 from pzd.quantities import CHANNELS, DAMPING, DISPLACEMENT, FRICTION, STIFFNESS, TEMPERATURE, VOLTAGE, Control
 from pzd.record import Array
@@ -82,6 +83,8 @@ class Content:
     """Why the damper is not to be trusted."""
     by_curve: bool = False
     """Whether it is known by a measured curve alone: its table holds all of it, and `damper` is without force."""
+    drive: Drive | None = None
+    """What drives the stand, where that is asked for."""
 
     @property
     def origin(self) -> str:

@@ -108,7 +108,7 @@ def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str
     output = next(place for place, one in enumerate(found, 1) if one.causality == "output")
     states = ("canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions")
     cosimulation = (
-        _open("CoSimulation", _abilities(*states, "canInterpolateInputs")),
+        _open("CoSimulation", _abilities(*states, "canInterpolateInputs", "providesDirectionalDerivative")),
         "<SourceFiles>",
         *(_alone("File", {"name": name}) for name in sources),
         "</SourceFiles></CoSimulation>",
@@ -135,7 +135,9 @@ def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
     time = Variable(TIME.name, _reference("time"), "independent", TIME.unit, "simulated time")
     found = (*variables(content, dynamics), time)
     output = next(one.reference for one in found if one.causality == "output")
-    cosimulation = _alone("CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState"))
+    cosimulation = _alone(
+        "CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives")
+    )
     floats = (_alone("Float64", _attributes(one) | _number(one)) for one in found)
     structure = (f'<Output valueReference="{output}"/>', f'<InitialUnknown valueReference="{output}"/>')
     token_of = {"instantiationToken": token}
@@ -231,7 +233,7 @@ def folders() -> tuple[str | None, str | None]:
     machine = (sys.platform, platform.machine())
     found = _PLATFORMS.get(machine, (None, None))
     without = [version for version, folder in zip(("2.0", "3.0"), found, strict=True) if folder is None]
-    if _compiler() is None:
+    if _found_compiler() is None:
         found, without = (None, None), []
         log.warning("there is no C compiler (gcc or cc): the FMUs hold their sources and no library")
     for version in without:
@@ -256,21 +258,32 @@ def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) ->
     ------
     FilesError : when there is no compiler, or it refuses them
     """
-    compiler = _compiler()
-    if compiler is None:
-        raise FilesError("there is no C compiler (gcc or cc)")
+    chosen = compiler()
     # the id of a build would differ from build to build
     linked = ["-Wl,--build-id=none"] if sys.platform == "linux" else []
     with tempfile.TemporaryDirectory() as place:
         for name, data in sources.items():
             (Path(place) / name).write_bytes(data)
-        command = [compiler, *_FLAGS, *linked, *to_compile, "-o", "library", "-lm"]
+        command = [chosen, *_FLAGS, *linked, *to_compile, "-o", "library", "-lm"]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)  # noqa: S603  # our own sources
         if done.returncode:
             said = " ".join(done.stderr.split()) or f"exit code {done.returncode}"
-            raise FilesError(f"{compiler}: it does not compile the sources of the FMU; mend or remove it ({said})")
+            raise FilesError(f"{chosen}: it does not compile the sources of the FMU; mend or remove it ({said})")
         return (Path(place) / "library").read_bytes()
 
 
-def _compiler() -> str | None:
+def compiler() -> str:
+    """Return the C compiler.
+
+    Raises
+    ------
+    FilesError : when there is none
+    """
+    found = _found_compiler()
+    if found is None:
+        raise FilesError("there is no C compiler (gcc or cc); install one")
+    return found
+
+
+def _found_compiler() -> str | None:
     return shutil.which("gcc") or shutil.which("cc")

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pzd.artefacts import Diagnosed, Identified, MountedDampers, Table, damper_without_force
+from pzd.artefacts import Diagnosed, Identified, MountedDampers, Rig, Table, damper_without_force
 from pzd.export.content import WRITTEN_BY_PZD, Content
-from pzd.export.formats import Format, format_of, formats
+from pzd.export.drive import Drive, drive, plan_of
+from pzd.export.formats import Files, Format, format_of, formats
+from pzd.export.formats.drive import NAME as DRIVE
 from pzd.pipeline.command import Opened, stale_stages
+from pzd.record import Record
+from pzd.rig.config import Limits
 from pzd.runs.disk import as_files_error, refuse_links, versions, write_afresh
 from pzd.schema.errors import ConfigError, FilesError
 
@@ -34,7 +38,9 @@ class Exported:
     """Why the damper is not to be trusted, a line a reason."""
 
 
-def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
+def exported(
+    given: Opened, to: str, out: Path | None, remedy: str, certify: bool = False, waveform: str | None = None
+) -> Exported:
     """Write the damper of a run in one format.
 
     Parameters
@@ -43,6 +49,8 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     to : name of the format
     out : folder of the files; None for `FOLDER` in the folder of the run
     remedy : the command that brings the run up to date, as far as `LAST`
+    certify : whether what is exported is run beside pzd on the records of the run, and the certificate goes with it
+    waveform : that drives the stand, a block in YAML; None for the test that diagnose asks for next
 
     Returns
     -------
@@ -65,8 +73,12 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
             f"--to {to}: it holds the dynamics of a damper, and a measured curve has none; choose a form of its table, "
             f"{', '.join(name for name, one in formats().items() if not one.dynamics)}"
         )
+    if wanted.name == DRIVE:
+        contents = tuple(replace(one, drive=_drive(given, one, waveform)) for one in contents)
+    elif waveform is not None:
+        raise ConfigError(f"--waveform: is what drives the stand, with --to {DRIVE} (got --to {to})")
     with given.placed():
-        files = {name: data for content in contents for name, data in wanted.files(content).items()}
+        files = _written(given, wanted, contents, certify)
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
         if out is None:
@@ -83,6 +95,52 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
             log.info("%s: removed, as the damper of %s has no such part any more", path, given.run.config.name)
     marks = dict.fromkeys(mark for content in contents for mark in content.marks)
     return Exported(tuple(folder / name for name in files), tuple(marks))
+
+
+def _written(given: Opened, wanted: Format, contents: Sequence[Content], certify: bool) -> Files:
+    """Return the files of every damper of a run.
+
+    Raises
+    ------
+    ConfigError : when two of them would write one file
+    """
+    found: dict[str, bytes] = {}
+    for content in contents:
+        files = _certified(given, wanted, content) if certify else wanted.files(content)
+        if twice := sorted(found.keys() & files.keys()):
+            raise ConfigError(
+                f"--to {wanted.name}: both dampers of the config would write {twice[0]}; export each from a config of "
+                "its own"
+            )
+        found |= files
+    return found
+
+
+def _records(given: Opened, content: Content) -> list[Record]:
+    """Return the records of the damper's setting.
+
+    Raises
+    ------
+    ConfigError : when the config has no rig
+    """
+    if given.config.rig is None:
+        raise ConfigError(f"{given.run.config}: has no rig, so that there are no records and no stand to drive")
+    return [record for record in given.run.read(Rig).records if content.setting in (None, record.setting)]
+
+
+def _drive(given: Opened, content: Content, waveform: str | None) -> Drive:
+    """Return the history that drives the stand."""
+    records, rig = _records(given, content), given.config.rig
+    found, folder = given.run.read(Diagnosed).diagnosis.next_test, given.run.config.parent
+    return drive(plan_of(found, waveform, records, rig.limits if rig else Limits(), content.damper, folder))
+
+
+def _certified(given: Opened, wanted: Format, content: Content) -> Files:
+    """Return the files of a format with the certificate, on the records of the damper's setting."""
+    if wanted.certified is None:
+        able = ", ".join(one.name for one in formats().values() if one.certified)
+        raise ConfigError(f"--certify: runs a form that has dynamics: --to {able} (got {wanted.name})")
+    return wanted.certified(content, _records(given, content), versions())
 
 
 def _outdated(folder: Path, wanted: Format, config: Path, files: Collection[str]) -> list[Path]:

@@ -44,6 +44,77 @@ DAMPERS = {
 """Of one temperature and of two, with effects, and with one control signal or none."""
 
 
+def with_effects(damper: Damper, **effects: dict[str, Any]) -> Damper:
+    """The damper with effects beside its own."""
+    return Damper(
+        base=damper.base, effects={**damper.effects, **effects}, reference_temperature_degC=30.0, zero_m=0.004
+    )
+
+
+BESIDE = {
+    "fluid_inertia": {"m": 12.0},
+    "gas_spring": {"k_g": 3000.0},
+    "preload_offset": {"F_0": -80.0},
+    "accumulator": {"F_g": 250.0, "L": 0.04},
+    "end_stop": {"k_e": 3e4, "x_e": 0.02},
+    "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
+    "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
+}
+IN_THE_FLOW = {
+    "asymmetry": {"alpha": -0.3},
+    "orifice_quadratic": {"q": (1500.0, 4000.0), "at_voltage_V": (0.0, 120.0)},
+    "relief_valve": {"F_r": 900.0, "C_r": 800.0},
+}
+KNEE = {"beta": 0.4, "F_reb": 950.0, "C_reb": 700.0, "F_comp": 800.0, "C_comp": 400.0}
+EXPORTED = {
+    "plain": DAMPERS["plain"],
+    "passive": DAMPERS["passive"],
+    "single": DAMPERS["single"],
+    "warm": DAMPERS["warm"],
+    "frictionless": Damper(base=tuple(row.model_copy(update={"T0_N": 0.0}) for row in CONTROLLED)),
+    "stiff": Damper(base=tuple(row.model_copy(update={"k_N_per_m": 1e9}) for row in CONTROLLED)),
+    "orifice": with_effects(DAMPERS["plain"], orifice_quadratic={"q": 2500.0}),
+    "relief": with_effects(DAMPERS["plain"], relief_valve={"F_r": 1000.0, "C_r": 500.0}),
+    "knee": with_effects(DAMPERS["plain"], knee=KNEE),
+    "knee and relief": with_effects(DAMPERS["plain"], knee=KNEE, **IN_THE_FLOW),
+    "lash": with_effects(DAMPERS["plain"], lash={"delta": 8e-4}),
+    "play": with_effects(DAMPERS["plain"], piezo_hysteresis={"r": 12.0}),
+    "drift": with_effects(DAMPERS["plain"], temperature_drift={"beta_T0": 0.01, "beta_C": 0.02}),
+    "beside": with_effects(DAMPERS["plain"], **BESIDE),
+    "lag": with_effects(DAMPERS["plain"], valve_lag={"tau": 0.004}),
+    "lag and play": with_effects(DAMPERS["plain"], valve_lag={"tau": 0.02}, piezo_hysteresis={"r": 9.0}),
+    "rounded": with_effects(DAMPERS["plain"], rounded_yield={"w_s": 0.02}),
+    "rounded and orifice": with_effects(DAMPERS["plain"], rounded_yield={"w_s": 0.1}, **IN_THE_FLOW),
+    "thinning": with_effects(DAMPERS["plain"], shear_thinning={"n": 0.7}),
+    "thinning and rounded": with_effects(
+        DAMPERS["plain"], shear_thinning={"n": (0.5, 0.9), "at_voltage_V": (0.0, 100.0)}, rounded_yield={"w_s": 0.03}
+    ),
+    "hysteresis": with_effects(DAMPERS["plain"], bouc_wen={"F_h": 150.0, "x_h": 2e-3, "sigma": 1.5}),
+    "pocket": with_effects(DAMPERS["plain"], cavitation={"d_c": 2e-3, "s_c": 4e-4}),
+    "pocket in compression": with_effects(DAMPERS["plain"], cavitation={"d_c": -1e-3, "s_c": 2e-3}),
+    "frame": with_effects(DAMPERS["plain"], frame_compliance={"d_f": 8e-4, "s_f": 3e-4}),
+    "rigid": Damper(base=tuple(row.model_copy(update={"k_N_per_m": np.inf}) for row in CONTROLLED)),
+    "elasto-plastic": Damper(base=tuple(row.model_copy(update={"C_Ns_per_m": 0.0}) for row in CONTROLLED)),
+    "rig": with_effects(DAMPERS["plain"], sensor_delay={"tau": 0.002}),
+    "all": with_effects(
+        DAMPERS["warm"],
+        **BESIDE,
+        **IN_THE_FLOW,
+        lash={"delta": 3e-4},
+        cavitation={"d_c": 3e-4, "s_c": 4e-4},
+        frame_compliance={"d_f": 4e-4, "s_f": 3e-4},
+        bouc_wen={"F_h": 90.0, "x_h": 1e-3, "sigma": 0.8},
+        rounded_yield={"w_s": 0.01},
+        shear_thinning={"n": 0.9},
+        valve_lag={"tau": 0.01},
+        piezo_hysteresis={"r": 5.0},
+        temperature_drift={"beta_T0": 0.004, "beta_C": (0.01, 0.002), "at_voltage_V": (0.0, 150.0)},
+    ),
+}
+"""Together they have every effect of the library, each alone and all at once."""
+EXPORTED["all but the lag"] = EXPORTED["all"].without_effects("valve_lag")
+
+
 def content_of(damper: Damper, **table: Any) -> Content:
     """What is exported of a damper whose rig reached 0.6 m/s."""
     config = TableConfig(**table)

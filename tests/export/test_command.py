@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
@@ -107,6 +108,30 @@ def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:
         2,
         [f"--to: no such format; there are {', '.join(formats())}; did you mean json? (got jsom)"],
     )
+
+
+def test_a_certificate_goes_with_what_has_dynamics_and_nothing_else(typed) -> None:
+    typed("table", "first.yaml")
+    code, _, (line,) = typed("export", "first.yaml", "--to", "csv", "--certify")
+    assert code == 2
+    assert "--certify: runs a form that has dynamics: --to c-dynamics, fmu (got csv)" in line
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed: apt-get install gcc")
+    assert typed("export", "first.yaml", "--to", "c-dynamics", "--certify")[0] == 0
+    found = json.loads(Path("runs/first/export/certificate.json").read_text())
+    assert found["same"]
+    assert {one["record"] for one in found["records"]} == {path.stem for path in Path("runs/first/1-rig").glob("*.csv")}
+
+
+def test_a_waveform_drives_the_stand_and_nothing_else(typed) -> None:
+    typed("table", "first.yaml")
+    waveform = ("--waveform", "{kind: sine, frequency_Hz: 1, amplitude_m: 0.001}")
+    code, _, (line,) = typed("export", "first.yaml", "--to", "csv", *waveform)
+    assert code == 2
+    assert "--waveform: is what drives the stand, with --to drive (got --to csv)" in line
+    assert typed("export", "first.yaml", "--to", "drive", *waveform)[0] == 0
+    written = Path("runs/first/export")
+    assert sorted(path.suffix for path in written.glob("first-sine-1Hz-0.001m.*")) == [".csv", ".drv", ".mat"]
 
 
 def test_two_formats_at_once_are_refused(typed) -> None:

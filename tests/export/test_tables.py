@@ -24,7 +24,9 @@ def numbers(content: Content, field: str) -> np.ndarray:
     return np.array([getattr(row, field) for row in content.table.force], dtype=float)
 
 
-@pytest.mark.parametrize("name", sorted(set(formats()) - {"c", "fmu"}))  # these have tests of their own
+@pytest.mark.parametrize(
+    "name", sorted(set(formats()) - {"c", "c-dynamics", "c-lookup", "drive", "fmu"})
+)  # these have tests of their own
 def test_a_format_gives_the_same_bytes_twice_and_names_version_and_config(name: str, content: Content) -> None:
     again = replace(content)
     written = formats()[name].files(content)
@@ -32,7 +34,7 @@ def test_a_format_gives_the_same_bytes_twice_and_names_version_and_config(name: 
     assert all(content.origin.encode() in data for data in written.values())
 
 
-@pytest.mark.parametrize("name", sorted(formats()))
+@pytest.mark.parametrize("name", sorted(set(formats()) - {"drive"}))  # which needs a history
 def test_a_format_names_the_setting_whatever_stands_in_it(name: str) -> None:
     content = replace(content_of(DAMPERS["plain"]), setting="gap\n1 */ 'wide'")
     for data in formats()[name].files(content).values():

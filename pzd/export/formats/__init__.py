@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
@@ -14,6 +14,7 @@ from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
+    from pzd.record import Record
 
 Files = Mapping[str, bytes]
 """Contents by the name of the file."""
@@ -31,6 +32,11 @@ class Format:
     """Returns the files: the same bytes for the same damper, and `Content.origin` in each, uncompressed.
 
     Raises ConfigError where the format cannot hold the damper.
+    """
+    certified: Callable[[Content, Sequence[Record], Mapping[str, str]], Files] | None = None
+    """Returns the same files with a certificate: what was exported, run beside pzd on the records; by these versions.
+
+    None where there is nothing to run.
     """
     needs: str | None = None
     """The library that writes it, an extra; None where pzd itself needs it anyway."""

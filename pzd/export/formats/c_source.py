@@ -1,4 +1,7 @@
-"""C for a control unit: the table, its inverse and the comfort law, in single precision and without allocation."""
+"""C: the table for a control unit, with its inverse and the comfort law, and the damper with its dynamics.
+
+The one is in single precision, without state; the other in double or single. Neither allocates memory.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,10 @@ from typing import TYPE_CHECKING
 from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from pzd.export.content import Content
+    from pzd.record import Record
 
 NAME = "c"
 
@@ -72,4 +78,73 @@ def _data(content: Content) -> str:
     )
 
 
-FORMATS = (Format(NAME, "table, inverse and comfort law for a control unit", files),)
+# --- The damper with its dynamics ---
+
+
+def dynamic_files(content: Content) -> Files:
+    """Write the sources of the damper with its dynamics, and a program that runs it along a sampled motion.
+
+    Raises
+    ------
+    ConfigError : when an effect of the user's own has a law that C cannot hold
+    """
+    from pzd.export.dynamics import Dynamics, element_files, source
+
+    element, _ = element_files(content, Dynamics.of(content.damper))
+    return element | {"run.c": source(content, "run.c")}
+
+
+def certified(content: Content, records: Sequence[Record], versions: Mapping[str, str]) -> Files:
+    """Write the same with the certificate of either precision on the records of the run.
+
+    Raises
+    ------
+    ConfigError : when an effect of the user's own has a law that C cannot hold
+    FilesError : when there is no compiler, or it refuses the sources
+    """
+    from pzd.export.certificate import NAME as CERTIFICATE
+    from pzd.export.certificate import by_program, certificate
+
+    found = dynamic_files(content)
+    run, of = by_program(found), "element.c, double precision"
+    single, of_single = by_program(found, SINGLE), "element.c, single precision"
+    return {
+        **found,
+        CERTIFICATE: certificate(content, of, records, run, False, versions),
+        f"single-{CERTIFICATE}": certificate(content, of_single, records, single, False, versions),
+    }
+
+
+def lookup_files(content: Content) -> Files:
+    """Write the same with the path of the element as a look-up over a fixed step.
+
+    Raises
+    ------
+    ConfigError : when an effect of the user's own has a law that C cannot hold, or the table has empty cells
+    """
+    from pzd.export.lookup import lookup_data, lookup_path
+
+    content.full_grid(LOOKUP)
+    return {**dynamic_files(content), "lookup_data.h": lookup_data(content, lookup_path(content)).encode()}
+
+
+LOOKUP = "c-lookup"
+SINGLE = "-DDAMPER_SINGLE"
+"""What builds the sources in single precision."""
+
+FORMATS = (
+    Format(NAME, "table, inverse and comfort law for a control unit", files),
+    Format(
+        "c-dynamics",
+        "the damper with its dynamics in C, double or single precision",
+        dynamic_files,
+        certified=certified,
+        dynamics=True,
+    ),
+    Format(
+        LOOKUP,
+        "the same for a real-time target: a look-up over a fixed step of 1 ms, its largest error told",
+        lookup_files,
+        dynamics=True,
+    ),
+)

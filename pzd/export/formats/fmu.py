@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from pzd.export.content import Content
+    from pzd.record import Record
 
 NAME = "fmu"
 _COMMON = ("model.c",)
@@ -28,6 +29,39 @@ def files(content: Content) -> Files:
     ConfigError : when an effect of the user's own has a law that C cannot hold
     FilesError : when the compiler refuses the sources
     """
+    return {_name(content, version): _archive(members, content.origin) for version, members in _built(content).items()}
+
+
+def certified(content: Content, records: Sequence[Record], versions: Mapping[str, str]) -> Files:
+    """Write an FMU of each version with the certificate of its library on the records of the run.
+
+    Raises
+    ------
+    ConfigError : when an effect of the user's own has a law that C cannot hold
+    FilesError : when the compiler refuses the sources, or there is no library to run
+    """
+    from pzd.export.certificate import NAME as CERTIFICATE
+    from pzd.export.certificate import by_library, certificate
+    from pzd.export.dynamics import Dynamics, data_of
+    from pzd.schema.errors import FilesError
+
+    token, found = data_of(content, Dynamics.of(content.damper))[1], {}
+    for version, members in _built(content).items():
+        library = next((data for name, data in members.items() if name.startswith("binaries/")), None)
+        if library is None:
+            raise FilesError(f"--certify: {_name(content, version)} holds no library of this machine to run")
+        run, name = by_library(library, version, token), _name(content, version)
+        written = certificate(content, name, records, run, version == 3, versions)
+        found[name] = _archive({**members, f"documentation/{CERTIFICATE}": written}, content.origin)
+    return found
+
+
+def _name(content: Content, version: int) -> str:
+    return f"{content.name}-fmi{version}.fmu"
+
+
+def _built(content: Content) -> dict[int, dict[str, bytes]]:
+    """Return the members of the archives by the version of FMI."""
     from pzd.export.dynamics import ELEMENT_SOURCES, Dynamics, element_files, source
     from pzd.export.fmi import IDENTIFIER, build_description, compiled_library, fmi2, fmi3, folders, suffix
 
@@ -46,7 +80,7 @@ def files(content: Content) -> Files:
             members["sources/buildDescription.xml"] = build_description(to_compile).encode()
         if folder is not None:
             members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = compiled_library(sources, to_compile)
-        found[f"{content.name}-fmi{version}.fmu"] = _archive(members, content.origin)
+        found[version] = members
     return found
 
 
@@ -66,4 +100,6 @@ def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     return written.getvalue()
 
 
-FORMATS = (Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files, dynamics=True),)
+FORMATS = (
+    Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files, certified, dynamics=True),
+)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pzd.export.content import Content
     from pzd.record import Array
 
@@ -23,14 +25,25 @@ _TEXT = 116
 
 def files(content: Content) -> Files:
     """Write one file of level 5."""
+    return {f"{content.name}.mat": matlab(_variables(content), content)}
+
+
+def matlab(variables: Mapping[str, Any], content: Content) -> bytes:
+    """Write variables as a file of level 5, which says where the damper comes from.
+
+    Parameters
+    ----------
+    variables : by name; a mapping becomes a structure
+    content : the damper
+    """
     from io import BytesIO
 
     from scipy.io import savemat
 
     written = BytesIO()
-    savemat(written, _variables(content), oned_as="row", long_field_names=True)  # type: ignore[arg-type]  # a file will do
+    savemat(written, dict(variables), oned_as="row", long_field_names=True)  # type: ignore[arg-type]  # a file will do
     text = f"MATLAB 5.0 MAT-file, {content.origin}".encode()[:_TEXT].ljust(_TEXT)  # in place of the time of writing
-    return {f"{content.name}.mat": text + written.getvalue()[_TEXT:]}
+    return text + written.getvalue()[_TEXT:]
 
 
 def _variables(content: Content) -> dict[str, Any]:

@@ -1,6 +1,9 @@
 #include "element.h"
 
 #include "element_data.h"
+#ifdef DAMPER_LOOKUP
+#include "lookup_data.h"
+#endif
 
 /* All parameters at one moment: the row of the element, that of the parallel forces, and those of the material. */
 typedef struct {
@@ -51,6 +54,36 @@ static real settled(element_state *state, real signal)
     return kernels_follow_voltage(signal, signal, R(0.0), state->drive, drive);
 }
 
+#ifdef DAMPER_LOOKUP
+static real share_of(real value, real limit, int nodes, int *low)
+{
+    const real place = most(R(0.0), least(R(1.0), (value + limit) / (R(2.0) * limit))) * (real)(nodes - 1);
+    *low = (int)place < nodes - 2 ? (int)place : nodes - 2;
+    return place - (real)*low;
+}
+
+/* Elastic deflection [m] after LOOKUP_STEP, by the table. */
+static real looked_up(real deflection, real velocity, real effective, real temperature)
+{
+    real warmer, higher, found[2][2];
+    const int t = place_of(LOOKUP_AT_TEMPERATURE, LOOKUP_TEMPERATURES, temperature, &warmer);
+    const int s = place_of(LOOKUP_AT_SIGNAL, LOOKUP_SIGNALS, effective, &higher);
+    const int ts[] = {t, t + 1 < LOOKUP_TEMPERATURES ? t + 1 : t}, ss[] = {s, s + 1 < LOOKUP_SIGNALS ? s + 1 : s};
+    const real limit = between(between(LOOKUP_MOST[ts[0]][ss[0]], LOOKUP_MOST[ts[1]][ss[0]], warmer),
+                               between(LOOKUP_MOST[ts[0]][ss[1]], LOOKUP_MOST[ts[1]][ss[1]], warmer), higher);
+    int i, j;
+    const real a = share_of(deflection, limit, LOOKUP_DEFLECTIONS, &i);
+    const real b = share_of(velocity, LOOKUP_SPEED, LOOKUP_SPEEDS, &j);
+    for (int n = 0; n < 2; n++)
+        for (int m = 0; m < 2; m++) {
+            const real(*after)[LOOKUP_SPEEDS] = LOOKUP_AFTER[ts[n]][ss[m]];
+            found[n][m] = between(between(after[i][j], after[i + 1][j], a),
+                                  between(after[i][j + 1], after[i + 1][j + 1], a), b);
+        }
+    return limit * between(between(found[0][0], found[1][0], warmer), between(found[0][1], found[1][1], warmer), higher);
+}
+#endif
+
 static int same(const row *one, const row *other)
 {
     int alike = 1;
@@ -79,7 +112,11 @@ element_state element_after(element_state state, const element_inputs *start, co
                             !same(&before.element, &after.element)};
     kernels_branches_follow(R(0.0), state.branches, before.parallel);
     compose_advance_branches(R(0.5) * (over.u0 + over.u1) * step, over.u0, over.u1, step, state.branches, after.parallel);
+#ifdef DAMPER_LOOKUP
+    state.path[0] = looked_up(state.path[0], R(0.5) * (over.u0 + over.u1), last, end->temperature);
+#else
     path_advance(state.path, over, TOLERANCE, 0);
+#endif
     return state;
 }
 

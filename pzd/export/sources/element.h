@@ -3,7 +3,8 @@
  * Inputs go linearly over a step, or are held where both ends are the same. Within the step the path is a closed form
  * where there is one, and else integrated piece by piece; `laws.c` holds both, and every law. Extension (rebound) is
  * positive. No memory is allocated. To build: cc -std=c99 -O2 -c element.c laws.c, in single precision with
- * -DDAMPER_SINGLE.
+ * -DDAMPER_SINGLE. With -DDAMPER_LOOKUP the path is a look-up in `lookup_data.h`, which `--to c-lookup` writes: of
+ * LOOKUP_STEP whatever the step, in the same time for every input.
  */
 #ifndef ELEMENT_H
 #define ELEMENT_H

@@ -169,7 +169,7 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
                                                const fmi2ValueReference known[], size_t knowns, const fmi2Real by[],
                                                fmi2Real of[])
 {
-    return checked(c, "it has no directional derivatives");
+    return checked(c, model_derivative(damper_of(c), unknown, unknowns, known, knowns, by, of));
 }
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t count,

@@ -140,6 +140,16 @@ EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], 
     return checked(c, count == size ? model_set(damper_of(c), vr, count, values) : ONE_VALUE);
 }
 
+EXPORT fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t count,
+                                               const fmi3ValueReference knowns[], size_t directions,
+                                               const fmi3Float64 seed[], size_t seeds, fmi3Float64 sensitivity[],
+                                               size_t size)
+{
+    if (count != size || directions != seeds)
+        return checked(c, ONE_VALUE);
+    return checked(c, model_derivative(damper_of(c), unknowns, count, knowns, directions, seed, sensitivity));
+}
+
 EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Boolean keeps,
                              fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                              fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
@@ -217,8 +227,6 @@ REFUSED(fmi3SetClock, REFERENCES, const fmi3Clock values[])
 REFUSED(fmi3GetNumberOfVariableDependencies, fmi3ValueReference vr, size_t *count)
 REFUSED(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elements[], fmi3ValueReference independents[],
         size_t indices[], fmi3DependencyKind kinds[], size_t count)
-REFUSED(fmi3GetDirectionalDerivative, const fmi3ValueReference unknowns[], size_t n, const fmi3ValueReference knowns[],
-        size_t m, const fmi3Float64 seed[], size_t seeds, fmi3Float64 sensitivity[], size_t size)
 REFUSED(fmi3GetAdjointDerivative, const fmi3ValueReference unknowns[], size_t n, const fmi3ValueReference knowns[],
         size_t m, const fmi3Float64 seed[], size_t seeds, fmi3Float64 sensitivity[], size_t size)
 REFUSED(fmi3GetOutputDerivatives, REFERENCES, const fmi3Int32 orders[], fmi3Float64 values[], size_t size)

@@ -85,6 +85,34 @@ const char *model_set_rates(model *m, const unsigned variables[], size_t count, 
     return NULL;
 }
 
+/* Derivative of the force by one input, by a central difference over a millionth of its size. */
+static double slope_of(const model *m, unsigned input)
+{
+    const double usual = input == DISPLACEMENT ? 1e-3 : input == VELOCITY ? 1e-2 : 1.0; /* [m], [m/s] */
+    const double half = 1e-6 * fmax(fabs(m->values[input]), usual);
+    model above = *m, below = *m;
+    above.values[input] += half;
+    below.values[input] -= half;
+    return (force_of(&above) - force_of(&below)) / (2.0 * half);
+}
+
+const char *model_derivative(const model *m, const unsigned unknowns[], size_t count, const unsigned knowns[],
+                             size_t directions, const double seed[], double found[])
+{
+    double along = 0.0;
+    for (size_t i = 0; i < directions; i++) {
+        if (!is_input(knowns[i]))
+            return "the force has derivatives by inputs alone";
+        along += seed[i] * slope_of(m, knowns[i]);
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (unknowns[i] != FORCE)
+            return "the force alone has derivatives";
+        found[i] = along;
+    }
+    return NULL;
+}
+
 /* The displacement goes with the velocity, whatever rate of its own it was given. */
 const char *model_step(model *m, double time, double step)
 {

@@ -19,6 +19,8 @@ typedef struct {
 const char *model_get(const model *m, const unsigned variables[], size_t count, double values[]);
 const char *model_set(model *m, const unsigned variables[], size_t count, const double values[]);
 const char *model_set_rates(model *m, const unsigned variables[], size_t count, const int order[], const double rates[]);
+const char *model_derivative(const model *m, const unsigned unknowns[], size_t count, const unsigned knowns[],
+                             size_t directions, const double seed[], double found[]);
 const char *model_step(model *m, double time, double step);
 
 /* A state is a copy of the whole model, of its size in memory and in bytes; none is made where `*state` is one. */
