@@ -198,7 +198,7 @@ class AverageCycle:
         error = pure_error(folded - creep + creep.mean())
         finest = resolution(record.displacement)
         hidden = finest > 0.0 and error.sample_variance < (0.5 * finest) ** 2
-        by_steps = _variance_by_steps(folded.mean(axis=0), finest, error.mean.size) if hidden else 0.0
+        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size) if hidden else 0.0
         return cls(run, error.points, error.mean, error.of_mean + by_steps)
 
     @cached_property
@@ -267,11 +267,11 @@ class AverageCycle:
         return at
 
 
-def _variance_by_steps(cycle: Array, step: float, harmonics: int) -> Array:
+def variance_by_steps(cycle: Array, step: float, harmonics: int) -> Array:
     """Compute the variance |.|^2 of the harmonics (H + 1,) of a cycle (points,) by the steps of its channel [m^2].
 
-    The error is a sawtooth in the displacement. It fills the harmonics up to the fastest of its teeth: all of them where
-    a step takes less than two samples, else as many fewer.
+    The error is a sawtooth in the displacement. It fills the harmonics up to the fastest of its teeth: all where a step
+    takes less than two samples, else as many fewer.
 
     Equation: (q^2 / 12) / min(n, 2 h), h = max abs(dx/dphase) / q teeth a cycle; n samples
                                                                     Source: Bennett 1948, Bell Syst. Tech. J. 27
