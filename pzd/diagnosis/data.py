@@ -293,17 +293,26 @@ def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, .
 def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:
     """Cut the spectrum of the displacement where it sinks into noise; with it, others that are as likely.
 
-    These are the smoothed one with noise, smoothed again: none where the motion stands out of its noise everywhere.
+    These are the smoothed one with noise, read in the same steps from another zero, and smoothed again: none where the
+    motion stands out of its noise everywhere.
     """
+    step = resolution(record.displacement)
     corner = min(motion_below(record.displacement), _resolved_below(record.displacement))
     smooth, beyond = _low_passed(record.displacement, corner)
     smoothed = _with_motion(record, _derivatives(smooth, record.rate))
     if beyond == 0.0:
         return smoothed, ()
     draw = np.random.default_rng(DRAWS)
-    drawn = (smooth + beyond * draw.standard_normal(smooth.size) for _ in range(DRAWS))
-    others = (_with_motion(record, _derivatives(_low_passed(x, corner)[0], record.rate)) for x in drawn)
-    return smoothed, (smoothed, *others)
+    noise = float(np.sqrt(max(beyond**2 - step**2 / 12.0, 0.0)))
+
+    def other() -> Motion:
+        seen = smooth + noise * draw.standard_normal(smooth.size)
+        if step > 0.0:
+            zero = step * draw.uniform(-0.5, 0.5)
+            seen = step * np.round((seen - zero) / step) + zero
+        return _derivatives(_low_passed(seen, corner)[0], record.rate)
+
+    return smoothed, (smoothed, *(_with_motion(record, other()) for _ in range(DRAWS)))
 
 
 def _resolved_below(displacement: Array) -> float:

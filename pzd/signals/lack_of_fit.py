@@ -162,7 +162,7 @@ def fit_smooth_residual(
     of them on average adds to what it takes of noise, and what it leaves of them is no noise.
 
     Equation: F = (RSS_0 - RSS) / (p s^2 + E_0 - E), s^2 = (RSS - E) / (n - p), E_0 and E as RSS_0 and RSS, mean over
-    the errors                                                              Source: Satterthwaite 1946; JCGM 101:2008
+    the errors; degrees of freedom by the scatter of E_0 - E                Source: Satterthwaite 1946; JCGM 101:2008
 
     Parameters
     ----------
@@ -198,17 +198,23 @@ def fit_smooth_residual(
     over = float(flat @ flat - taken @ taken)
     # QUIETEST adds white noise that may not be there: then the remainder is smaller than expected.
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
-    by_noise, freedom = rank * scale, float(free)
+    by_noise, shown, freedom = rank * scale, float(rank), float(free)
     if drawn and noise.innovation > 0.0:
         parts = [_taken_of_error(motion, force, predicted - force, counted, noise, whole) for motion, force in drawn]
         spread = spread + np.mean([part**2 for part, _, _ in parts], axis=0)
-        own, left = (float(np.mean([each[i] for each in parts])) for i in (1, 2))
+        each = np.array([taken_of_it for _, taken_of_it, _ in parts])
+        own, left = float(np.mean(each)), float(np.mean([rest for _, _, rest in parts]))
         white = rank * max(over - left, 0.0) / free
         by_noise = max(by_noise, white + own)
-        freedom = by_noise**2 / (white**2 / free + (by_noise - white) ** 2 / (rank * len(drawn)))
+        # Errors of steps that repeat with the motion lie in few directions, and scatter the more.
+        scatter = float(np.var(each, ddof=1)) if each.size > 1 else own**2
+        directions = float(np.clip(2.0 * own**2 / max(scatter, 2.0 * own**2 / rank), 1.0, rank))
+        beyond = by_noise - white
+        shown = by_noise**2 / (white**2 / rank + beyond**2 / directions)
+        freedom = by_noise**2 / (white**2 / free + beyond**2 / (directions * each.size))
     ratio = float(taken @ taken) / by_noise if over > 0.0 else np.inf
     excess = by_noise / (rank * scale) if scale > 0.0 else 1.0
-    return SmoothResidual(explained, spread, noise, float(fdtrc(rank, freedom, ratio)), excess)
+    return SmoothResidual(explained, spread, noise, float(fdtrc(shown, freedom, ratio)), excess)
 
 
 def _taken_of_error(
