@@ -66,7 +66,8 @@ class PreparedRecord:
     constant: bool
     """Whether the voltage is constant."""
     draws: tuple[Record, ...] = ()
-    """Two cycles of the lead; and the same with other displacements, as likely within noise and resolution."""
+    """Two cycles of the lead, or the whole record where nothing repeats; and the same with other displacements, as
+    likely within noise and resolution."""
 
     @cached_property
     def folded(self) -> Array:
@@ -118,7 +119,8 @@ def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     run = cycles(record.time, record.displacement)
     travel = np.abs(np.gradient(record.displacement))
     if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
-        return PreparedRecord(_smoothed_displacement(record), None, None, constant)
+        smoothed, draws = _smoothed_displacement(record)
+        return PreparedRecord(smoothed, None, None, constant, draws)
     average = AverageCycle.of(record, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
@@ -195,8 +197,9 @@ class AverageCycle:
         creep = drift_over_cycles(folded)
         error = pure_error(folded - creep + creep.mean())
         finest = resolution(record.displacement)
-        hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
-        return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)
+        hidden = finest > 0.0 and error.sample_variance < (0.5 * finest) ** 2
+        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size) if hidden else 0.0
+        return cls(run, error.points, error.mean, error.of_mean + by_steps)
 
     @cached_property
     def clear(self) -> NDArray[np.bool_]:
@@ -264,6 +267,21 @@ class AverageCycle:
         return at
 
 
+def variance_by_steps(cycle: Array, step: float, harmonics: int) -> Array:
+    """Compute the variance |.|^2 of the harmonics (H + 1,) of a cycle (points,) by the steps of its channel [m^2].
+
+    The error is a sawtooth in the displacement. It fills the harmonics up to the fastest of its teeth: all where a step
+    takes less than two samples, else as many fewer.
+
+    Equation: (q^2 / 12) / min(n, 2 h), h = max abs(dx/dphase) / q teeth a cycle; n samples
+                                                                    Source: Bennett 1948, Bell Syst. Tech. J. 27
+    """
+    teeth = float(np.max(np.abs(np.gradient(cycle)))) * cycle.size / step
+    density = np.full(harmonics, 1.0 / cycle.size)
+    density[: int(np.ceil(teeth)) + 1] = 1.0 / min(cycle.size, max(2.0 * teeth, 1.0))
+    return density * (step**2 / 12.0)
+
+
 def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, ...]:
     """Return two cycles of the lead, and the same with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
@@ -272,23 +290,77 @@ def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, .
     return (two, *(_with_motion(two, motion(two.time)) for motion in motions))
 
 
-def _smoothed_displacement(record: Record) -> Record:
-    """Cut the spectrum of the displacement where it sinks into noise; derivatives by a spline.
+def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:
+    """Cut the spectrum of the displacement where it sinks into noise; with it, others that are as likely.
+
+    These are the smoothed one with noise, read in the same steps from another zero, and smoothed again: none where the
+    motion stands out of its noise everywhere.
+    """
+    step = resolution(record.displacement)
+    corner = min(motion_below(record.displacement), _resolved_below(record.displacement))
+    smooth, beyond = _low_passed(record.displacement, corner)
+    smoothed = _with_motion(record, _derivatives(smooth, record.rate))
+    if beyond == 0.0:
+        return smoothed, ()
+    draw = np.random.default_rng(DRAWS)
+    noise = float(np.sqrt(max(beyond**2 - step**2 / 12.0, 0.0)))
+
+    def other() -> Motion:
+        seen = smooth + noise * draw.standard_normal(smooth.size)
+        if step > 0.0:
+            zero = step * draw.uniform(-0.5, 0.5)
+            seen = step * np.round((seen - zero) / step) + zero
+        return _derivatives(_low_passed(seen, corner)[0], record.rate)
+
+    return smoothed, (smoothed, *(_with_motion(record, other()) for _ in range(DRAWS)))
+
+
+def _resolved_below(displacement: Array) -> float:
+    """Return the frequency above which a displacement (n,) holds no more than its steps add [rad/sample].
+
+    Where a step takes several samples its error is no white noise, and its lines would count as motion.
+
+    Equation: the least w with sum_(> w) |x_h|^2 <= q^2 / 12        Source: Morozov 1966, discrepancy principle
+    """
+    odd, _ = _reflected_odd(displacement)
+    power = np.abs(np.fft.rfft(odd)) ** 2 * (2.0 / odd.size**2)
+    beyond = np.cumsum(power[::-1])[::-1]
+    first = int(np.searchsorted(-beyond, -(resolution(displacement) ** 2) / 12.0))
+    return min(first * (2.0 * np.pi / odd.size), np.pi)
+
+
+def _reflected_odd(displacement: Array) -> tuple[Array, Array]:
+    """Return a displacement (n,) less the line through its ends, continued by its point reflection, and the line."""
+    line = np.linspace(displacement[0], displacement[-1], displacement.size)
+    odd = displacement - line
+    return np.concatenate([odd, -odd[:0:-1]]), line
+
+
+def _low_passed(displacement: Array, corner: float) -> tuple[Array, float]:
+    """Return a displacement (n,) without what is above a corner [rad/sample], and its noise [m].
+
+    The noise is that of the octave above the corner, where what the motion loses is counted with it.
+    """
+    odd, line = _reflected_odd(displacement)
+    spectrum = np.fft.rfft(odd)
+    frequency = np.arange(spectrum.size) * (2.0 * np.pi / odd.size)
+    octave = spectrum[(frequency > corner) & (frequency <= 2.0 * corner)]
+    spectrum[frequency > corner] = 0.0
+    noise = float(np.sqrt(np.mean(np.abs(octave) ** 2) / odd.size)) if octave.size else 0.0
+    return np.fft.irfft(spectrum, odd.size)[: line.size] + line, noise
+
+
+def _derivatives(smooth: Array, rate: float) -> Motion:
+    """Return a smooth displacement (n,) with its derivatives by a spline.
 
     Those of the spectrum would ring from either end, where the curvature of the reflected record jumps.
     """
     from scipy.interpolate import make_interp_spline
 
-    n = record.time.size
-    line = np.linspace(record.displacement[0], record.displacement[-1], n)
-    odd = record.displacement - line
-    spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
-    frequency = np.arange(spectrum.size) * record.rate / (2 * n - 1)
-    spectrum[frequency > motion_below(record.displacement) * record.rate / (2.0 * np.pi)] = 0.0
-    smooth = np.fft.irfft(spectrum, 2 * n - 1)[:n] + line
-    course = make_interp_spline(np.arange(n), smooth, DEGREE)
-    speed, acceleration = (np.asarray(course(np.arange(n), order)) * record.rate**order for order in (1, 2))
-    return _with_motion(record, (smooth, speed, acceleration))
+    at = np.arange(smooth.size)
+    course = make_interp_spline(at, smooth, DEGREE)
+    speed, acceleration = (np.asarray(course(at, order)) * rate**order for order in (1, 2))
+    return smooth, speed, acceleration
 
 
 # --- Exclusion of saturated records

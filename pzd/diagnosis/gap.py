@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pzd.artefacts import Gap, Region
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.data import PreparedRecord, Split
-from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples
-from pzd.record import Array, Mask
+from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples, drawn_calm, unresolved_turns
+from pzd.record import Array, Mask, Record
 from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
@@ -77,7 +77,7 @@ def check_residual(
     mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
     variance = _difference_variance(prepared, without, mask)
-    calm = jump_bend(prepared, predicted) == 0.0
+    calm = jump_bend(prepared, predicted) + unresolved_turns(given.damper, record.displacement) == 0.0
     force, shifted = record.force - mains, _shifted(prepared, predicted)
 
     def explained_with(late: Array) -> Array:
@@ -101,7 +101,7 @@ def check_residual(
     if folded is not None:
         found = _check_cycles(prepared, mask, residual, explained, folded, given.displacement_variance)
     else:
-        found = _check_samples(prepared, mask, residual, explained, predicted)
+        found = _check_samples(prepared, mask, residual, explained, predicted, drawn_calm(given, calm, mask))
     return replace(found, hum=float(np.max(np.abs(mains))))
 
 
@@ -158,10 +158,16 @@ def _check_cycles(
 
 
 def _check_samples(
-    prepared: PreparedRecord, mask: Mask, residual: Array, nuisances: Array, predicted: Array
+    prepared: PreparedRecord,
+    mask: Mask,
+    residual: Array,
+    nuisances: Array,
+    predicted: Array,
+    drawn: Sequence[tuple[Record, Array]],
 ) -> ResidualCheck:
-    fit = lack_of_fit.fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
-    left = (residual - nuisances)[mask] - fit.explained
+    cleared = (residual - nuisances)[mask]
+    fit = lack_of_fit.fit_smooth_residual(cleared, prepared.record, predicted[mask], mask, drawn)
+    left = cleared - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)
     explained[mask] = fit.explained**2 - fit.spread

@@ -246,7 +246,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
         measured = np.concatenate([m for m, _ in mine])
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
-        scales = parameter_scales(parameters, measured).tolist()
+        scales = parameter_scales(parameters, widths, measured, whole.scales.speed).tolist()
         stiffest = 1.0 / (scales[2] + float(widths[2])) if scales[2] <= widths[2] else np.inf
         evidence = [
             ParameterEvidence(name, scale, width, width, SHOWN, veto, doubt)

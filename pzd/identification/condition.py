@@ -113,7 +113,8 @@ def parameter_rows(
     misfit = trust.misfit_of(records)
     noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
     widths = half_widths(records, misfit).reshape(-1, 3)
-    scales = np.stack([trust.parameter_scales(parameters, objective.measured) for _, parameters in optimum])
+    whole, speed = objective.measured, objective.scales[1]
+    scales = np.stack([trust.parameter_scales(p, w, whole, speed) for (_, p), w in zip(optimum, widths, strict=True)])
     shares = trust.partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
     cosines = trust.stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
     rows = []

@@ -28,7 +28,8 @@ WEAK_WIDTH = 0.1
 WEAK_SHIFT = 0.2
 """Largest shift by the sensor error of a parameter that is not weak, as a share of it."""
 FRICTION_FLOOR = 0.05
-"""T0 is judged against itself or this share of the r.m.s. force, the larger: a friction of zero is a result."""
+"""T0 is judged against itself or this share of the r.m.s. force, the larger: a friction of zero is a result. So is a
+damping whose interval holds zero: it is judged by its force at peak speed."""
 SPRING_TO_NOISE = 10.0
 """Least deflection of the oil spring at peak force, in the noise of the displacement, at which k is not weak: below,
 the fit of k follows the noise."""
@@ -188,10 +189,20 @@ def friction_scale(friction: float, force: Array) -> float:
     return max(friction, FRICTION_FLOOR * rms(force))
 
 
-def parameter_scales(parameters: Bingham, measured: Array) -> Array:
-    """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N], by measured forces (N,) [N]."""
+def parameter_scales(parameters: Bingham, widths: Array, measured: Array, speed: float) -> Array:
+    """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N].
+
+    Parameters
+    ----------
+    parameters : T0, C and k
+    widths : (3,) half widths of their 95 % intervals
+    measured : (N,) force [N]
+    speed : largest of the tests [m/s]
+    """
     friction, damping, stiffness = parameters
-    return np.array([friction_scale(friction, measured), damping, 1.0 / stiffness])
+    may_be_none = damping <= widths[1] < np.inf
+    least = friction_scale(0.0, measured) / speed if may_be_none else 0.0
+    return np.array([friction_scale(friction, measured), max(damping, least), 1.0 / stiffness])
 
 
 def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from pzd.record import Array, Mask
 from pzd.signals.cycles import Cycles
+from pzd.signals.measures import reversals
 
 # --- Jumps of the force ---
 
@@ -51,15 +52,15 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     return found
 
 
-def jumps_in_samples(measured: Array, predicted: Array, reversals: int = 0) -> Array:
+def jumps_in_samples(measured: Array, predicted: Array, turns: int = 0) -> Array:
     """Find the samples beside jumps in a record or in its prediction, which shows jumps that noise hides; as `jumps`.
 
     Parameters
     ----------
     measured, predicted : (n,) force [N]
-    reversals : number of reversals of the motion, with which the largest number of samples grows
+    turns : number of reversals of the motion, with which the largest number of samples grows
     """
-    most = max(MOST_IN_SAMPLES, SAMPLES_PER_REVERSAL * reversals)
+    most = max(MOST_IN_SAMPLES, SAMPLES_PER_REVERSAL * turns)
     return np.maximum(jumps(measured, most), jumps(predicted, most))
 
 
@@ -104,6 +105,52 @@ def unresolved_flanks(force: Array, turns: Sequence[int], rate: float) -> Mask:
         if abs(steps[steepest]) > max(0.5 * change, FLANK_TO_NOISE * noise):
             jump = low + steepest
             found[max(min(jump, turn - 1), 0) : max(jump, turn) + 2] = True  # late or early, that is chance too
+    return found
+
+
+SMALL_STROKE = 0.01
+"""Least stroke between two reversals at which a friction turns, as a share of the range.
+
+Reason: of noise that is left in the motion at rest there would be more than samples; not tuned."""
+
+
+def beside_unresolved_reversals(displacement: Array, travel: float, *, closed: bool = False) -> Mask:
+    """Find the samples within one interval of a reversal after which the force turns within one interval.
+
+    Where in that interval the rod reverses, its samples do not tell: a force there may have turned already, or not yet.
+    The second differences of `jumps` show it only where the smooth part of the force bends less than it jumps.
+
+    Parameters
+    ----------
+    displacement : (n,) cleaned [m]
+    travel : of the rod from a reversal until the force has turned, 2 T0/k [m]
+    closed : whether the last sample is followed by the first, as in an average cycle
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 2.0, 3.0, 2.2, 1.2, 0.2])
+    >>> np.flatnonzero(beside_unresolved_reversals(x, 0.5)).tolist()
+    [3, 4]
+    >>> np.flatnonzero(beside_unresolved_reversals(x, 2.5)).tolist()
+    []
+    """
+    size = displacement.size
+    found, x = np.zeros(size, dtype=np.bool_), displacement
+    if closed:
+        x = np.concatenate([x, x, x])
+    for turn in reversals(x, SMALL_STROKE):
+        if not 2 <= turn < x.size - 2:
+            continue
+        before, at, after = (float(x[turn + i]) for i in (-1, 0, 1))
+        bend = before - 2.0 * at + after
+        vertex = turn + float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend else float(turn)
+        top = at - 0.125 * (before - after) ** 2 / bend if bend else at
+        ahead = int(np.floor(vertex)) + 1
+        share = vertex + 1.0 - ahead
+        gone = abs((1.0 - share) * float(x[ahead]) + share * float(x[ahead + 1]) - top)
+        if gone > travel:
+            beside = np.arange(int(np.ceil(vertex - 1.0)), int(np.floor(vertex + 1.0)) + 1)
+            found[beside % size if closed else beside] = True
     return found
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Complex, Mask, Record, sliced
 from pzd.signals.jumps import gradient_within_stretches, has_predecessors, split_at_gaps
 from pzd.signals.measures import rms
-from pzd.signals.noise import Autoregression, PureError, autoregression, harmonics_of, pure_error
+from pzd.signals.noise import Autoregression, PureError, autoregression, harmonics_of, octave_bands, pure_error
 
 # --- Records that repeat ---
 
@@ -27,18 +27,6 @@ TREND_HARMONICS = 15
 """Harmonics in which a trend is sought: those that a change of T0, C or k moves most."""
 FEWEST_DIFFERENCES = 100
 """Fewest samples of differences between cycles for the colour of the noise; with fewer nothing is judged."""
-
-
-def octave_bands(last: int) -> list[tuple[int, int]]:
-    """Return the octaves of harmonics (first, last): 0, 1, 2-3, 4-7, ... up to `last`.
-
-    Examples
-    --------
-    >>> octave_bands(5)
-    [(0, 0), (1, 1), (2, 3), (4, 5)]
-    """
-    edges = [0] + [2**i for i in range(int(np.log2(max(last, 1))) + 1)]
-    return [(low, min(high - 1, last)) for low, high in zip(edges, [*edges[1:], last + 1], strict=True)]
 
 
 def p_values_by_harmonics(error: PureError) -> Array:
@@ -154,9 +142,14 @@ class SmoothResidual:
     """Noise of the remainder."""
     probability: float
     """Probability that noise alone lets the model explain so much."""
+    excess: float
+    """Variance by noise of what the model explains, over that by `noise` alone: above 1 where errors of the motion
+    move it more than an autoregression tells."""
 
 
-def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
+def fit_smooth_residual(
+    residual: Array, record: Record, predicted: Array, counted: Mask, drawn: Sequence[tuple[Record, Array]] = ()
+) -> SmoothResidual:
     """Split the residual of a record that does not repeat into misfit and noise.
 
     Wandering noise hides a level or a slow term: terms that the samples hardly determine are shrunk, each of p being
@@ -165,6 +158,11 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
     Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
                                                                             Source: Hoerl and Kennard 1970
+    Errors of the motion make a force that is as smooth as a misfit, and are in the terms as well. What the model takes
+    of them on average adds to what it takes of noise, and what it leaves of them is no noise.
+
+    Equation: F = (RSS_0 - RSS) / (p s^2 + E_0 - E), s^2 = (RSS - E) / (n - p), E_0 and E as RSS_0 and RSS, mean over
+    the errors; degrees of freedom by the scatter of E_0 - E                Source: Satterthwaite 1946; JCGM 101:2008
 
     Parameters
     ----------
@@ -172,13 +170,14 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     record : the motion, (n,)
     predicted : (m,) force [N]
     counted : (n,) which samples of the record these m are; whitening does not reach across those left out
+    drawn : the motion with other errors that are as likely, and (m,) its force [N]; none where it is known
     """
     from scipy.special import fdtrc
 
     terms = _smooth_terms(record, predicted, counted)
     if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
         nothing = np.zeros(residual.size)
-        return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
+        return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0, 1.0)
     basis = _orthonormal(terms)
     explained = basis @ (basis.T @ residual)
     expected = float(residual @ residual) / basis.shape[1]
@@ -199,8 +198,39 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     over = float(flat @ flat - taken @ taken)
     # QUIETEST adds white noise that may not be there: then the remainder is smaller than expected.
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
-    ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
-    return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
+    by_noise, shown, freedom = rank * scale, float(rank), float(free)
+    if drawn and noise.innovation > 0.0:
+        parts = [_taken_of_error(motion, force, predicted - force, counted, noise, whole) for motion, force in drawn]
+        spread = spread + np.mean([part**2 for part, _, _ in parts], axis=0)
+        each = np.array([taken_of_it for _, taken_of_it, _ in parts])
+        own, left = float(np.mean(each)), float(np.mean([rest for _, _, rest in parts]))
+        white = rank * max(over - left, 0.0) / free
+        by_noise = max(by_noise, white + own)
+        # Errors of steps that repeat with the motion lie in few directions, and scatter the more.
+        scatter = float(np.var(each, ddof=1)) if each.size > 1 else own**2
+        directions = float(np.clip(2.0 * own**2 / max(scatter, 2.0 * own**2 / rank), 1.0, rank))
+        beyond = by_noise - white
+        shown = by_noise**2 / (white**2 / rank + beyond**2 / directions)
+        freedom = by_noise**2 / (white**2 / free + beyond**2 / (directions * each.size))
+    ratio = float(taken @ taken) / by_noise if over > 0.0 else np.inf
+    excess = by_noise / (rank * scale) if scale > 0.0 else 1.0
+    return SmoothResidual(explained, spread, noise, float(fdtrc(shown, freedom, ratio)), excess)
+
+
+def _taken_of_error(
+    record: Record, predicted: Array, error: Array, counted: Mask, noise: Autoregression, whole: Mask
+) -> tuple[Array, float, float]:
+    """Return what the terms of a motion with an error take of the force by that error.
+
+    Returns
+    -------
+    (m,) the part that they take [N], and its squares and those of the rest in units of noise
+    """
+    basis = _orthonormal(_smooth_terms(record, predicted, counted))
+    whitened, flat = noise.whitened(basis)[whole], noise.whitened(error)[whole]
+    estimate = np.linalg.lstsq(whitened, flat, rcond=SINGULAR_SHARE)[0]
+    taken = float(np.sum((whitened @ estimate) ** 2))
+    return basis @ estimate, taken, float(flat @ flat) - taken
 
 
 def _orthonormal(terms: Array) -> Array:

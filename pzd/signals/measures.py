@@ -95,12 +95,13 @@ REVERSAL_SHARE = 0.1
 """Least stroke between two reversals, as a share of the range: noise and the creep of a servo stay below it."""
 
 
-def reversals(displacement: Array) -> list[int]:
-    """Find the samples at which a motion reverses, each between strokes larger than `REVERSAL_SHARE` of the range.
+def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
+    """Find the samples at which a motion reverses, each between strokes larger than a share of the range.
 
     Parameters
     ----------
     displacement : (n,) motion, in any unit
+    share : least stroke, as a share of the range
 
     Returns
     -------
@@ -111,7 +112,7 @@ def reversals(displacement: Array) -> list[int]:
     >>> reversals(np.array([0.0, 1.0, 2.0, 1.0, 0.0, 1.0]))
     [2, 4]
     """
-    enough = REVERSAL_SHARE * float(np.ptp(displacement))
+    enough = share * float(np.ptp(displacement))
     steps = np.sign(np.diff(displacement))
     candidates = [0, *(np.flatnonzero(steps[1:] != steps[:-1]) + 1).tolist(), displacement.size - 1]
     turns: list[int] = []

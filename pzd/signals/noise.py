@@ -318,12 +318,25 @@ def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, s
     return np.asarray(2.0 / (2.0 / freedom + 4.0 / independent * density / largest))
 
 
+def octave_bands(last: int) -> list[tuple[int, int]]:
+    """Return the octaves of harmonics (first, last): 0, 1, 2-3, 4-7, ... up to `last`.
+
+    Examples
+    --------
+    >>> octave_bands(5)
+    [(0, 0), (1, 1), (2, 3), (4, 5)]
+    """
+    edges = [0] + [2**i for i in range(int(np.log2(max(last, 1))) + 1)]
+    return [(low, min(high - 1, last)) for low, high in zip(edges, [*edges[1:], last + 1], strict=True)]
+
+
 def repeatable_power(error: PureError) -> Array:
     """Estimate the power of the repeatable part of the residual at each harmonic, the share of the noise subtracted.
 
     Equation: P_0 = c_0^2 - s_0^2,  P_h = 2 (|c_h|^2 - s_h^2)       Source: Parseval
 
-    Errors shared by all cycles (noise of the displacement) are subtracted down to zero at most, at each harmonic.
+    Errors shared by all cycles (noise of the displacement) are subtracted down to zero at most, octave by octave: at
+    each harmonic by itself half of them would be subtracted in vain.
 
     Returns
     -------
@@ -331,4 +344,10 @@ def repeatable_power(error: PureError) -> Array:
     """
     weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
     repeats = np.abs(error.mean) ** 2 - error.single / error.count
-    return np.asarray(weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0))))
+    shared = np.broadcast_to(error.shared, repeats.shape)
+    for low, high in octave_bands(repeats.size - 1):
+        band = slice(low, high + 1)
+        whole = float(shared[band].sum())
+        if whole > 0.0:
+            repeats[band] -= shared[band] * min(1.0, max(float(repeats[band].sum()), 0.0) / whole)
+    return np.asarray(weights * repeats)

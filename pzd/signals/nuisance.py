@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pzd.record import Array, Mask
 from pzd.schema.model import Frozen
-from pzd.signals.jumps import gradient_within_stretches
+from pzd.signals.jumps import gradient_within_stretches, jump_timing_error
 
 FIRST_TIMING_COLUMN = 2
 """Index of the first column of timing (delay, instant of the voltage); those before it are of size (offset, gain)."""
@@ -100,7 +100,8 @@ def likely_delay(
     """Return the most likely delay of a test [s], by shifts of the force as a whole.
 
     Where a force jumps, as that of a rigid damper at a reversal, a delay of more than a sample is no change along its
-    slope.
+    slope. A damper of dry friction alone shows its delay nowhere but at its jumps: these count, but for the sample in
+    which they fall.
 
     Equation: min_d min_b |F - A_d b - F(t - d)|^2 / s^2 + |b|^2 + (d / sd_d)^2, A_d = [sd_o peak, sd_g F(t - d)]
 
@@ -110,20 +111,26 @@ def likely_delay(
     delayed : gives the predicted force (m,) at a delay [s]
     variance : of the noise [N^2]
     config : standard deviations of the priors
-    calm : (m,) the samples that enter, those beside no jump of the measured force
+    calm : (m,) the samples beside no jump of the measured force, from which offset and gain are estimated
     """
     if config.delay_s == 0.0:
         return 0.0
     peak, force = float(np.max(np.abs(measured))), measured[calm]
+    beside = np.flatnonzero(~calm)
     weight = max(variance, 1e-12 * peak**2)
     shares = np.linspace(-NUISANCE_LIMIT, NUISANCE_LIMIT, DELAYS_TRIED)
     costs = np.empty(shares.size)
     for i, share in enumerate(shares):
-        predicted = delayed(share * config.delay_s)[calm]
+        whole = delayed(share * config.delay_s)
+        predicted = whole[calm]
         columns = np.column_stack([np.full(force.size, config.offset * peak), config.gain * predicted])
         left, pulled = force - predicted, columns.T @ (force - predicted) / weight
         own = np.linalg.solve(columns.T @ columns / weight + np.eye(2), pulled)
         costs[i] = float(left @ left) / weight - float(own @ pulled) + share**2
+        if beside.size:
+            cleared = measured - own[0] * config.offset * peak - own[1] * config.gain * whole
+            late = (cleared - whole - jump_timing_error(cleared, whole))[beside]
+            costs[i] += float(late @ late) / weight
     best = int(np.clip(np.argmin(costs), 1, shares.size - 2))
     bend = costs[best - 1] - 2.0 * costs[best] + costs[best + 1]
     between = 0.5 * (costs[best - 1] - costs[best + 1]) / bend if bend > 0.0 else 0.0

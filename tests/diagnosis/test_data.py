@@ -9,12 +9,17 @@ import pytest
 from numpy.random import Generator
 from synthetic import damper_of, sine, sines
 
+from pzd.blind.independent import stand
+from pzd.blind.independent.kernel import plain_force
+from pzd.blind.independent.stand import Actuator, LaboratoryCampaign, LaboratoryTest, MotionKind
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split
-from pzd.diagnosis.fit.prediction import predicted_force
+from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split, variance_by_steps
+from pzd.diagnosis.fit.prediction import predict, predicted_force
+from pzd.diagnosis.gap import check_residual, visible_gap
 from pzd.record import Array, Record
+from pzd.signals.nuisance import NuisanceConfig
 
 
 @pytest.mark.parametrize("channel", ["force", "velocity", "displacement"])
@@ -124,3 +129,74 @@ def test_the_predicted_force_falls_as_the_oil_warms(rng: Generator) -> None:
     )
     assert measured[-1] / measured[0] == pytest.approx(1.0 - 0.06 * WARMS_BY * 7 / 8, abs=0.004)
     np.testing.assert_allclose(predicted, measured, rtol=2e-3)
+
+
+# --- Steps and noise of a displacement that does not repeat, or repeats with its steps
+
+
+SWEEP_RATE = 1000.0
+
+
+def swept(step: float, noise: float, rng: Generator) -> tuple[Record, Array]:
+    """A sweep from 0.5 to 3 Hz, read in steps [m] and with noise [m]; and its true velocity."""
+    t = np.arange(0.0, 10.0, 1.0 / SWEEP_RATE)
+    phase = 2.0 * np.pi * (0.5 * t + 0.125 * t**2)
+    x, rate = 0.003 * np.sin(phase), 2.0 * np.pi * (0.5 + 0.25 * t)
+    seen = x + noise * rng.standard_normal(t.size)
+    seen = np.round(seen / step) * step if step else seen
+    v = 0.003 * rate * np.cos(phase)
+    return Record("sweep", None, t, seen, v, np.gradient(v, t), v, None), v
+
+
+@pytest.mark.parametrize(("step", "noise"), [(1.1e-4, 0.0), (1.1e-4, 2e-6), (0.0, 1e-5), (2e-5, 5e-6)])
+def test_the_error_of_a_sweep_is_as_large_as_that_of_the_others_drawn(
+    step: float, noise: float, rng: Generator
+) -> None:
+    """Read in 55 steps a stroke: the error of a step is no white noise, and its lines were once taken for motion."""
+    record, true = swept(step, noise, rng)
+    (prepared,) = prepare((record,))
+    assert prepared.cycles is None
+    kept, others = prepared.draws[0], prepared.draws[1:]
+    inside = slice(500, -500)
+    own = np.std((kept.velocity - true)[inside])
+    drawn = np.mean([np.std((each.velocity - kept.velocity)[inside]) for each in others])
+    assert own < 0.02 * np.max(true)
+    assert 0.3 < own / drawn < 3.0
+
+
+@pytest.mark.parametrize("points", [2000, 400, 80])
+def test_the_steps_of_a_channel_fill_the_harmonics_up_to_their_teeth(points: int, rng: Generator) -> None:
+    """Of 40 steps a stroke: all the power of the error is in 2 pi 20 = 126 harmonics, and little beyond."""
+    step, phase = 1e-3, 2.0 * np.pi * np.arange(points) / points
+    whole = np.zeros(points // 2 + 1)
+    for offset in rng.uniform(-0.5, 0.5, 200) * step:
+        x = 20.0 * step * np.sin(phase + 1e3 * offset) + offset
+        whole += np.abs(np.fft.rfft(np.round(x / step) * step - x) / points) ** 2 / 200.0
+    given = variance_by_steps(20.0 * step * np.sin(phase), step, whole.size)
+    low = slice(1, min(126, points // 2))
+    assert np.mean(whole[low]) == pytest.approx(np.mean(given[low]), rel=0.4)
+    assert np.sum(whole) < 1.1 * np.sum(given)
+
+
+# --- What noise of the displacement makes of the force: no gap, whatever the motion
+
+
+@pytest.mark.parametrize("kind", ["sweep", "random"])
+def test_noise_of_the_displacement_is_no_gap_in_motions_that_do_not_repeat(kind: MotionKind, rng: Generator) -> None:
+    """Ten micrometres on a viscous damper at 200 Hz."""
+    test = LaboratoryTest(kind, 0.008, 1.5, 12)
+    campaign = LaboratoryCampaign((test,), (0.0,), 200.0)
+    motion = stand.driven(campaign, test, Actuator.drawn(rng), rng)
+    at = motion.recorded
+    force = plain_force(motion.time, motion.displacement, 0.0, 7000.0, 1e-8)
+    reading = np.interp(motion.time[at], motion.time[::2], force)
+    reading = reading + 1e-3 * np.max(np.abs(reading)) * rng.standard_normal(at.size)
+    x = motion.displacement[at] + 1e-5 * rng.standard_normal(at.size)
+    v = np.gradient(x, motion.time[at])
+    record = Record(kind, None, motion.time[at], x, v, np.gradient(v, motion.time[at]), reading, None)
+    (prepared,) = prepare((record,))
+    plain = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=7000.0, k_N_per_m=1e8),))
+    wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(plain, prepared, 5e-4), prepared, wanted, NuisanceConfig())
+    assert check.probability["smooth"][0] > 1e-4
+    assert visible_gap([check]) < 0.0025

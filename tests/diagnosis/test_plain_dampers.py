@@ -12,12 +12,17 @@ from synthetic import STAND
 
 from pzd.artefacts import Diagnosed, ParameterRow, Rig
 from pzd.blind.independent.kernel import plain_force
+from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.data import prepare
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import check_residual
 from pzd.diagnosis.stage import diagnose
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.signals.nuisance import NuisanceConfig
 
 FINER = 32
 """Steps of the integration a sample."""
@@ -104,3 +109,24 @@ def test_the_late_force_of_a_slow_converter_is_named(tau: float, rng: Generator)
     assert found.diagnosis.effects == ("sensor_delay",)
     value = found.diagnosis.parameters["sensor_delay"]["tau"].value
     assert value == pytest.approx(tau, abs=2e-4)
+
+
+@pytest.mark.parametrize("T0", [60.0, 128.0, 500.0])
+def test_a_reversal_between_two_samples_is_no_effect(T0: float, rng: Generator) -> None:
+    """43 samples a cycle of a stiff damper: the force turns within one, now before it is sampled and now after."""
+    tests = ((2.5, 0.0128), (2.33, 0.02), (1.7, 0.015))
+    records = [record_of(T0, 5675.0, 5.1e8, sine, 0.8 * rng.standard_normal(361), 100.0) for sine in tests]
+    (row,), found = diagnosed(records)
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("none", ()), found.diagnosis.reason
+    assert row.C_Ns_per_m == pytest.approx(5675.0, rel=0.02)
+
+
+def test_coarse_steps_of_a_displacement_that_does_not_repeat_for_them_are_no_gap(rng: Generator) -> None:
+    """A stroke of 7 mm read in 200 steps, on a stiff damper."""
+    made = record_of(810.0, 904.0, 1.06e7, (1.97, 0.0035), 12.0 * rng.standard_normal(10001), 5000.0)
+    (prepared,) = prepare((replace(made, displacement=3.47e-5 * np.round(made.displacement / 3.47e-5)),))
+    assert prepared.cycles is None
+    plain = Damper(base=(BaseRow(T0_N=810.0, C_Ns_per_m=904.0, k_N_per_m=1.06e7),))
+    wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(plain, prepared, 5e-4), prepared, wanted, NuisanceConfig())
+    assert check.probability["smooth"][0] > 1e-3

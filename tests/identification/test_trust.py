@@ -55,6 +55,20 @@ def test_a_damper_without_friction_has_a_friction_of_zero_and_not_an_undetermine
     assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.01)
 
 
+@pytest.mark.parametrize("stiffness", [np.inf, 4e5])
+def test_a_damper_of_friction_alone_has_a_damping_of_zero_up_to_a_small_force(
+    stiffness: float, rng: np.random.Generator
+) -> None:
+    """It left C empty, and the run ended as not to be trusted."""
+    record = sine_test(Bingham(2000.0, 0.0, stiffness), 2.0, 0.02)
+    row = row_for(with_noise(record, rng))
+    assert row.C_Ns_per_m is not None
+    assert row.C_Ns_per_m_low95 == 0.0
+    assert row.C_Ns_per_m_high95 * np.abs(record.velocity).max() < 0.05 * 2000.0
+    assert "undetermined: C" not in row.status
+    assert pytest.approx(2000.0, rel=0.03) == row.T0_N
+
+
 def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not(rng: np.random.Generator) -> None:
     row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 4e9), 2.0, 0.02), rng))
     assert row.k_N_per_m is None

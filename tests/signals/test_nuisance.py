@@ -1,4 +1,4 @@
-"""Offset, gain and delay of a test may only take away from a residual."""
+"""Offset, gain and delay of a test may only take away from a residual; the delay shows at jumps as well."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
+from pzd.signals.jumps import jumps
+from pzd.signals.nuisance import NuisanceConfig, likely_delay, nuisance_forces
 
 
 def forces(kind: str) -> tuple[Array, Array]:
@@ -35,3 +36,17 @@ def test_what_a_test_explains_never_makes_the_residual_larger(kind: str, sign: f
         parts = nuisance_forces(sign * residual, predicted, 100.0, 1.0, config, nothing, calm, whole)
         left = sign * residual - sum(parts)
         assert left[calm] @ left[calm] <= (residual[calm] @ residual[calm]) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("delay", [-1.2e-3, -4e-4, 0.0, 4e-4, 1.2e-3])
+def test_dry_friction_shows_a_delay_at_its_jumps_alone(delay: float, rng: np.random.Generator) -> None:
+    """A force of 300 N either way at 5 kHz, up to six samples late or early: everywhere else it is as it was."""
+    time = np.arange(5000) / 5000.0
+    signal = 2.0 * np.pi * 9.7 * time + 0.4
+
+    def late(by: float) -> Array:
+        return 300.0 * np.sign(np.sin(signal - 2.0 * np.pi * 9.7 * by))
+
+    measured = late(delay) + 0.3 * rng.standard_normal(time.size)
+    found = likely_delay(measured, late, 0.09, NuisanceConfig(), jumps(measured) == 0.0)
+    assert found == pytest.approx(delay, abs=0.2e-3)

@@ -30,11 +30,14 @@ from pzd.blind.independent.kernel import plain_force
 from pzd.blind.independent.stand import Actuator, Driven, LaboratoryCampaign, LaboratoryTest, MotionKind
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.stage import diagnose
-from pzd.identification.bingham_fit import Bingham
+from pzd.identification.bingham_fit import Bingham, Objective, descend
+from pzd.identification.condition import parameter_rows
 from pzd.identification.config import IdentifyConfig
+from pzd.identification.prepared_record import fitted_records, prepare
 from pzd.identification.stage import identify
+from pzd.identification.stiffness import settle_stiffness
 from pzd.quantities import Control
-from pzd.record import Array, Record
+from pzd.record import Array, Record, conditions
 from pzd.rig.config import FilesEntry, RigConfig
 from pzd.rig.preflight import PreflightRecord, examined
 from pzd.schema.errors import DataError
@@ -48,7 +51,7 @@ KINDS: tuple[MotionKind, ...] = ("sine", "sine", "sine", "triangle", "sweep", "t
 """Motions of the tests; every second one of a rig is a sine."""
 RATES = (100.0, 128.0, 200.0, 256.0, 500.0, 512.0, 1000.0, 1024.0, 2000.0, 2048.0, 4000.0, 5000.0)
 MOST_SAMPLES = 25_000
-"""In all tests of a case, so that one takes seconds; what is beyond is not run."""
+"""In all tests of a case, unless said otherwise, so that one takes seconds; what is beyond is not run."""
 SAMPLES_A_CYCLE = 40.0
 """Least number: fewer are refused."""
 LIMIT_SHARE = 0.12
@@ -114,20 +117,21 @@ def with_ends(share: float) -> float:
     return float(np.clip((share - LIMIT_SHARE) / (1.0 - 2.0 * LIMIT_SHARE), 0.0, 1.0))
 
 
-def drawn(seed: int, count: int) -> list[Case]:
+def drawn(seed: int, count: int, most_samples: int = MOST_SAMPLES) -> list[Case]:
     """Draw the cases."""
     points = qmc.Sobol(16, seed=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
-    return [case(i, point.tolist(), default_rng(SeedSequence(seed, spawn_key=(i,)))) for i, point in enumerate(points)]
+    rngs = [default_rng(SeedSequence(seed, spawn_key=(i,))) for i in range(count)]
+    return [case(i, point.tolist(), rngs[i], most_samples) for i, point in enumerate(points)]
 
 
-def case(number: int, u: Sequence[float], rng: Generator) -> Case:
+def case(number: int, u: Sequence[float], rng: Generator, most_samples: int) -> Case:
     """Draw one case from a point of the unit cube; what is left goes by chance."""
     levels, each = 1 + int(5.0 * u[0] ** 1.5), 1 + int(6.0 * u[1])
     amplitude, rate = log_between(u[2], 0.005, 0.05), RATES[int(len(RATES) * u[3])]
-    least = max(0.2, 6.0 * levels * rate / MOST_SAMPLES)
+    least = max(0.2, 6.0 * levels * rate / most_samples)
     slowest = log_between(u[4], least, max(least, min(2.0, rate / SAMPLES_A_CYCLE / 1.5)))
     values = tuple(float(v) for v in np.linspace(0.0, 10.0, levels)) if levels > 1 else (0.0,)
-    tests = _tests(rng, each, amplitude, slowest, rate, values)
+    tests = _tests(rng, each, amplitude, (slowest, rate), values, most_samples)
     speed = max(2.0 * np.pi * t.frequency * t.amplitude for t in tests)
     peak, share = log_between(u[5], 50.0, 2e4), with_ends(u[6])
     friction, damping = share * peak, (1.0 - share) * peak / speed
@@ -152,9 +156,15 @@ def case(number: int, u: Sequence[float], rng: Generator) -> Case:
 
 
 def _tests(
-    rng: Generator, each: int, amplitude: float, slowest: float, rate: float, values: Sequence[float]
+    rng: Generator,
+    each: int,
+    amplitude: float,
+    rates: tuple[float, float],
+    values: Sequence[float],
+    most_samples: int,
 ) -> list[LaboratoryTest]:
-    """Plan the tests, the same at every level, as many as the samples allow."""
+    """Plan the tests, the same at every level, as many as the samples allow; rates: slowest test and sampling."""
+    slowest, rate = rates
     fastest = rate / SAMPLES_A_CYCLE
     tests: list[LaboratoryTest] = []
     for i in range(each):
@@ -167,7 +177,7 @@ def _tests(
         tests.append(LaboratoryTest(kind, size, frequency, length))
     every = [replace(t, value=value) for t in tests for value in values]
     samples = np.cumsum([t.seconds * rate for t in every])
-    fits = int(np.searchsorted(samples, MOST_SAMPLES))
+    fits = int(np.searchsorted(samples, most_samples))
     return every[: max(len(values) * (fits // len(values)), len(values))]
 
 
@@ -245,6 +255,8 @@ class Outcome:
     effects: tuple[str, ...]
     reason: str
     rows: tuple[ParameterRow, ...]
+    needless: tuple[str, ...]
+    """T0 and C that are empty or weak, row by row, where a fit that begins at the truth has them."""
     seconds: float
 
     @property
@@ -259,18 +271,35 @@ def judged(case_: Case, seed: int) -> Outcome:
     """Identify and diagnose a case."""
     begin = time.perf_counter()
     rows: tuple[ParameterRow, ...] = ()
+    needless: tuple[str, ...] = ()
     try:
         rig = rig_of(case_, seed)
         settings, config = IdentifyConfig(), RigConfig(files=(FilesEntry(path="*.csv"),))
         identified = identify(settings, rig, 1)
         rows = identified.rows
+        needless = tuple(_needless(case_, rig, rows, settings))
         found = diagnose(DiagnoseConfig(), settings, config, rig, identified, Control(), None, 1).diagnosis
         said = found.verdict, tuple(found.effects), found.reason
     except DataError as error:
         said = "refused", (), str(error)
     except Exception:  # noqa: BLE001  # a study goes on, and the case counts as failed
         said = "failed", (), traceback.format_exc()
-    return Outcome(case_, *said, rows, time.perf_counter() - begin)
+    return Outcome(case_, *said, rows, needless, time.perf_counter() - begin)
+
+
+def _needless(case_: Case, rig: Rig, rows: Sequence[ParameterRow], settings: IdentifyConfig) -> Iterator[str]:
+    """Yield T0 and C where identify leaves them empty or weak, and a fit that begins at the truth does not."""
+    found, _ = conditions(rig.records, None, settings.group.temperature_degC)
+    for row, condition in zip(rows, found, strict=True):
+        level = int(np.argmin(np.abs(np.array(case_.campaign.values) - (row.voltage_V or 0.0))))
+        objective = Objective(tuple(prepare(record) for record in condition.records))
+        fit = descend(objective, objective.clipped(case_.dampers[level]))
+        fit, stiffest = settle_stiffness(condition.records, objective, fit, settings.nuisance)
+        left = fit.residuals, fit.slopes
+        fitted = fitted_records(condition.records, objective.prepared, left, settings.nuisance)
+        optimum = [(condition.labels, fit.parameters)]
+        (reference,) = parameter_rows(objective, optimum, left, fitted, stiffest=stiffest)
+        yield from (name for name in ("T0", "C") if name in _doubted(row) and name not in _doubted(reference))
 
 
 def _judged(given: tuple[Case, int]) -> Outcome:
@@ -307,7 +336,9 @@ def coverage(outcomes: Sequence[Outcome]) -> Iterator[str]:
     for column in COLUMNS[:2]:
         name = column.partition("_")[0]
         empty, weak = sum(getattr(r, column) is None for r in rows), sum(name in _doubted(r) for r in rows)
-        yield f"rows: {name} empty {empty}, empty or weak {weak} of {len(rows)}"
+        needless = sum(o.needless.count(name) for o in outcomes)
+        from_truth = f"{needless} of them not by a fit that begins at the truth"
+        yield f"rows: {name} empty {empty}, empty or weak {weak} of {len(rows)}, {from_truth}"
 
 
 def _doubted(row: ParameterRow) -> str:

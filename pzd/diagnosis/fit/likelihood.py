@@ -20,7 +20,13 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import effective_voltage
 from pzd.diagnosis.data import PreparedRecord
-from pzd.diagnosis.fit.prediction import PredictedForce, simulation_motion, temperature_moves
+from pzd.diagnosis.fit.prediction import (
+    PredictedForce,
+    drawn_calm,
+    simulation_motion,
+    temperature_moves,
+    unresolved_turns,
+)
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
 from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, jumps_in_samples
@@ -314,6 +320,8 @@ MOST_HARMONICS = 80
 
 Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of the
 first, and `RESOLUTION` is no finer."""
+LEAST_CALM = 0.5
+"""Least share of the samples beside no jump by which the error of a model is judged; not tuned."""
 EQUAL_WEIGHT_DEVIATION = 0.05
 """Residual of the element without effects [share of the peak, r.m.s.], by which criterion (4) is set against the wide
 priors of C and k.
@@ -386,7 +394,9 @@ def _from_cycles(
     average = _resampled(simulated.mean(axis=0), points)
     # A cycle on fewer points than it has samples has lost as much of its noise.
     variance = error.sample_variance / len(counted) * points / error.points
-    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), variance)
+    x = _resampled(p.mean_motion[0], points)
+    calm = np.maximum(jumps(cycle), unresolved_turns(given.damper, x, closed=True)) == 0.0
+    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), variance, calm)
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
@@ -407,10 +417,15 @@ def _from_cycles(
     return with_nuisances(bare, given.damper, nuisance)
 
 
-def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
-    """Compute the r.m.s. residual of a model above the noise [N], offset, gain and delay of the test fitted."""
-    columns = np.column_stack([np.ones(force.size), force, slope])
-    residual = measured - force
+def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float, calm: NDArray[np.bool_]) -> float:
+    """Compute the r.m.s. residual of a model above the noise [N], offset, gain and delay of the test fitted.
+
+    Samples beside a jump are left out, unless there are hardly others: there the residual is chance.
+    """
+    if np.count_nonzero(calm) < LEAST_CALM * calm.size:
+        calm = np.ones_like(calm)
+    columns = np.column_stack([np.ones(force.size), force, slope])[calm]
+    residual = (measured - force)[calm]
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
     return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
 
@@ -453,11 +468,14 @@ def _from_samples(
     start, stop = int(first), int(last) + 1
     compared = mask[start:stop]
     measured = record.force[mask]
-    noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
+    calm = jumps_in_samples(record.force, force) + unresolved_turns(given.damper, record.displacement) == 0.0
+    smooth = fit_smooth_residual(measured - force[mask], record, force[mask], mask, drawn_calm(given, calm, mask))
+    noise = Autoregression(smooth.noise.coefficients, smooth.noise.innovation * smooth.excess)
     peak = float(np.max(np.abs(measured)))
     alike = _samples_per_harmonic(record)
     slope = gradient_within_stretches(force[mask], mask)
-    left = alike * (DISCREPANCY * _model_discrepancy(measured, force[mask], slope, noise.variance)) ** 2
+    discrepancy = _model_discrepancy(measured, force[mask], slope, noise.variance, calm[mask])
+    left = alike * (DISCREPANCY * discrepancy) ** 2
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
@@ -496,14 +514,16 @@ def with_nuisances(
     Equation: V = [s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
     """
     averaged, delayed = isinstance(bare.noise, PureError), bare.delayed(shown_force(bare, damper))
+    turns = unresolved_turns(damper, bare.at_compared(bare.motion.displacement), closed=averaged)
     found = replace(bare, delay_s=nuisance.delay_s)
     for _ in range(2):  # the second with the force where the likeliest delay puts it
         force = delayed(found.first_delay)
+        bends = jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)
         columns = np.column_stack(
             [
                 np.full(force.size, nuisance.offset * bare.peak),
                 nuisance.gain * force,
-                _jump_columns(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+                _jump_columns(np.maximum(bends, turns)),
                 *([] if timing is None else [timing]),
             ]
         )

@@ -12,7 +12,8 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.prepared_record import in_motion
-from pzd.record import Array, Record, Rows
+from pzd.record import Array, Mask, Record, Rows
+from pzd.signals.jumps import beside_unresolved_reversals, jumps
 from pzd.signals.measures import reversals
 from pzd.signals.noise import harmonics_of
 
@@ -137,6 +138,8 @@ class PredictedForce:
     """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
     timing: Array
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
+    drawn: tuple[tuple[Record, Array], ...]
+    """Other motions of a record that does not repeat, as likely as its own, each with its force (n,) [N]."""
 
 
 def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> PredictedForce:
@@ -149,9 +152,41 @@ def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> Predicted
     delay : standard deviation of a test's own delay [s]
     """
     force = predicted_force(damper, prepared)
-    return PredictedForce(
-        damper, force, displacement_variance(damper, prepared), _timing(damper, prepared, force, delay)
-    )
+    timing = _timing(damper, prepared, force, delay)
+    if prepared.lead is None:
+        drawn = tuple((draw, simulated_record(damper, draw)) for draw in prepared.draws[1:])
+        return PredictedForce(damper, force, 0.0, timing, drawn)
+    return PredictedForce(damper, force, displacement_variance(damper, prepared), timing, ())
+
+
+def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = False) -> Array:
+    """Return (n,) by how much the friction of a damper may be off beside a reversal that no sample resolves [N].
+
+    Equation: 2 T0 where the rod goes more than 2 T0/k within an interval, else 0
+
+    Parameters
+    ----------
+    damper : with T0 and k at each voltage, of which the largest counts
+    displacement : (n,) cleaned [m]
+    closed : whether the last sample is followed by the first
+    """
+    friction = max(row.T0_N for row in damper.base)
+    if friction == 0.0:
+        return np.zeros(displacement.size)
+    travel = max(2.0 * row.T0_N / row.k_N_per_m for row in damper.base)
+    return np.where(beside_unresolved_reversals(displacement, travel, closed=closed), 2.0 * friction, 0.0)
+
+
+def drawn_calm(given: PredictedForce, calm: Mask, counted: Mask) -> list[tuple[Record, Array]]:
+    """Return the other motions with their forces (m,) at the counted samples [N]; beside a jump with the force itself.
+
+    Parameters
+    ----------
+    given : predicted force
+    calm : (n,) the samples beside no jump
+    counted : (n,) which samples of the record count
+    """
+    return [(record, np.where(calm, force, given.force)[counted]) for record, force in given.drawn]
 
 
 def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float) -> Array:
@@ -165,6 +200,8 @@ def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float
 
 def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | float:
     """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
+
+    What they change beside a jump is its instant, which is left to chance in any case.
 
     Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
 
@@ -181,7 +218,9 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
         return 0.0
     points = prepared.draws[0].time.size // 2
     known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
-    changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
+    turns = unresolved_turns(damper, prepared.draws[0].displacement[points:], closed=True)
+    calm = np.maximum(jumps(known), turns) == 0.0
+    changes = np.fft.rfft((np.stack(others) - known) * calm, points, axis=1) / points
     power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     power[0] = 0.0  # a stuck damper keeps whatever offset it began with
     width = np.ones(2 * NEIGHBOURS + 1)

@@ -238,7 +238,7 @@ def detections(problem: Problem, before: FitResult, tried: Sequence[Candidate]) 
     }
     others = [library()[c.effect] for c in tried if c.effect not in searched]
     linear = [e for e in others if e.place != "material" or problem.pooled_temperatures() is problem]
-    traced = {e.name: [tangent.of_trace(e, trace) for trace in _traces(problem, before, e)] for e in linear}
+    traced = {e.name: [tangent.of_trace(e, *pair) for pair in _traces(problem, before, e)] for e in linear}
     return searched | {name: tuple(each for each in found if each) for name, found in traced.items()}
 
 
@@ -290,15 +290,18 @@ class _TangentSpace:
         forces = force_jacobian(problem, before.unknowns, before.optimum).dense() / units[:, np.newaxis]
         return cls(problem, before, np.asarray(np.linalg.qr(forces).Q), units)
 
-    def gap(self, simulated: Sequence[Array]) -> float:
+    def gap(self, simulated: Sequence[Array], reference: Sequence[Array] | None = None) -> float:
         """Compute the r.m.s. change of the force that no other values of the present variables would bring about."""
-        changed = (np.concatenate(simulated) - np.concatenate(self.before.simulated)) / self.units
+        reference = self.before.simulated if reference is None else reference
+        changed = (np.concatenate(simulated) - np.concatenate(reference)) / self.units
         return float(np.linalg.norm(least_squares.projected_out(self.forces, changed)))
 
-    def of_trace(self, effect: Effect, trace: Array) -> Detection | None:
+    def of_trace(self, effect: Effect, trace: Array, fainter: Array) -> Detection | None:
         """Estimate the gap of an effect that was not searched for; None where it shows nowhere or is impossible.
 
-        The present variables are refitted to first order, and the misfit is taken as a parabola in the size.
+        The present variables are refitted to first order, and the misfit is taken as a parabola in the size. Its slope
+        is that between two small sizes: a rigid damper takes its closed form without effects alone, and beside an
+        effect of no size its path differs from that already.
 
         Equation: u = d - J b, b = argmin |d - J b|; f = -r u / u u, g = f m, s = m / |u|, G = f^2 u u; r, d: the
         residuals and what the trace changes in them, J their slopes; u u over max(1, |r|^2 / (n - p))
@@ -307,33 +310,46 @@ class _TangentSpace:
         ----------
         effect : not among those before
         trace : its values in the units of the search, so small that the force is linear in them
+        fainter : values half as far from those that switch it off
         """
         problem, before = self.problem, self.before
         spread = _spread(before)
         unknowns = problem.unknowns((*before.effects, effect.name))
-        damper = problem.point(np.concatenate([before.optimum, trace]), unknowns).damper
+        damper, half = (problem.point(np.concatenate([before.optimum, x]), unknowns).damper for x in (trace, fainter))
         if effect.name in against_nature(damper):
             return None
-        shown = [shown_force(o, damper) for o in problem.observations]
-        simulated = [o.at_compared(f) for o, f in zip(problem.observations, shown, strict=True)]
-        pairs = zip(problem.observations, shown, strict=True)
-        left = [o.residual_and_slopes(f, np.zeros((f.size, 0)))[:, 0] for o, f in pairs]
+        (simulated, left), (simulated_half, left_half) = self._compared(damper), self._compared(half)
         residual = np.concatenate(before.residuals)
-        rest = least_squares.projected_out(self.before.column_basis, np.concatenate(left) - residual)
-        gap, power = self.gap(simulated), float(rest @ rest)
+        rest = least_squares.projected_out(self.before.column_basis, 2.0 * (left - left_half))
+        gap, power = 2.0 * self.gap(simulated, simulated_half), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None
         part = -float(residual @ rest) / power
         relevant_from = _smallest_relevant_gap(damper, effect.name, problem.scales.low_force, gap)
         return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0, relevant_from)
 
+    def _compared(self, damper: Damper) -> tuple[list[Array], Array]:
+        """Return the force of a damper at the compared samples of each observation [N], and all residuals (w,)."""
+        observed = self.problem.observations
+        shown = [shown_force(o, damper) for o in observed]
+        left = [o.residual_and_slopes(f, np.zeros((f.size, 0)))[:, 0] for o, f in zip(observed, shown, strict=True)]
+        return [o.at_compared(f) for o, f in zip(observed, shown, strict=True)], np.concatenate(left)
 
-def _traces(problem: Problem, before: FitResult, effect: Effect) -> Iterator[Array]:
-    """Yield small values of an effect in the units of the search, to either side where it starts from zero."""
+
+def _traces(problem: Problem, before: FitResult, effect: Effect) -> Iterator[tuple[Array, Array]]:
+    """Yield small values of an effect in the units of the search, to either side where it starts from zero.
+
+    Beside them those half as far from its being off.
+    """
     for start in starts_of(problem, before, effect):
-        faint = towards_neutral(problem, before, effect, start, thresholds.LINEARISED_SHARE)
-        away = thresholds.LINEARISED_FROM_ZERO
-        yield from (faint,) if np.any(faint) else (faint + away, faint - away)
+        faint, fainter = (
+            towards_neutral(problem, before, effect, start, share * thresholds.LINEARISED_SHARE) for share in (1.0, 0.5)
+        )
+        if np.any(faint):
+            yield faint, fainter
+        else:
+            for away in (thresholds.LINEARISED_FROM_ZERO, -thresholds.LINEARISED_FROM_ZERO):
+                yield faint + away, faint + 0.5 * away
 
 
 # --- Outcome of the search

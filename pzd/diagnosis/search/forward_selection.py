@@ -120,7 +120,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     evidence = weigh(damper)
     search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
     search.choose_temperature_axis()
-    initial_evidence, baseline = search.evidence, search.current
+    initial_evidence, search.baseline = search.evidence, search.current
     search.adopt_forced()
     while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():
         pass
@@ -128,7 +128,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     search.reweight_until_stable()
     undecided = search.undecided()  # gives reasons as well
     return Selection(
-        baseline,
+        search.baseline,
         search.current,
         tuple(search.steps),
         search.reasons,
@@ -152,6 +152,8 @@ class _ForwardSelection:
     evidence: Evidence
     """Weighed by what the current damper leaves."""
     current: FitResult
+    baseline: FitResult = field(init=False)
+    """Without effects."""
     steps: list[SelectionStep] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
     open_detections: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
@@ -187,12 +189,33 @@ class _ForwardSelection:
     def step(self) -> bool:
         """Adopt one more effect, an adopted one per voltage, or a supported pair; return whether any was."""
         tried = self._candidates(self.evidence, self.current)
+        if self._descends_from(tried):
+            tried = self._candidates(self.evidence, self.current)
         steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
         first = self._best_supported(steps)
         if first is None:
             return self._pair(tried)
         ended = converged(self.evidence.whole, self.current, self._physically_possible(first, steps))
         self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _ranked_above(first, steps))
+        return True
+
+    def _descends_from(self, tried: Sequence[Candidate]) -> bool:
+        """Search on from T0, C and k of the best candidate, without its effect; return whether that is a better fit.
+
+        Where a force jumps between samples the misfit has steps, and a fit may end on one. An effect that gets over it
+        would be paid for what T0, C and k do by themselves.
+        """
+        alike = [c for c in tried if c.delta_bic < 0.0 and len(c.fitted.damper.base) == len(self.current.damper.base)]
+        if not alike:
+            return False
+        best = min(alike, key=lambda c: c.fitted.misfit)
+        begin = best.fitted.optimum[: self.current.optimum.size]
+        found = fit(self.evidence.whole, self.current.effects, begin)
+        if found.misfit > self.current.misfit - thresholds.STUCK_MISFIT:
+            return False
+        if self.baseline is self.current:
+            self.baseline = found
+        self.current = found
         return True
 
     def _physically_possible(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
