@@ -27,6 +27,7 @@ from pzd.report.blocks import (
     sentence,
     spelled,
 )
+from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render
 
@@ -64,7 +65,7 @@ def changes_page(found: Compared, control: Control) -> str:
     if found.undetermined:
         sections.append(Section("trust", "Not to be trusted", (Notes(found.undetermined, "care"),)))
     title = f"What changed from {changes.from_} to {changes.to}"
-    return render(title, _cards(changes), (), tuple(sections), _FOOTER)
+    return render(title, _cards(changes, control), (), tuple(sections), _FOOTER)
 
 
 def course_page(found: Followed, control: Control) -> str:
@@ -109,7 +110,7 @@ def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
     return Panel(figure, name, f"{name} over the states {', '.join(course.states)}, with 95 % intervals.", "")
 
 
-def _cards(changes: Changes) -> tuple[Card, ...]:
+def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
     names = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "damper")))
     stand = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "stand")))
     d = changes.difference
@@ -123,7 +124,9 @@ def _cards(changes: Changes) -> tuple[Card, ...]:
         found.append(Card("What did the stand do?", stand, "This is not the damper's."))
     if changes.rivals:
         rivals = listed([spelled(name) for name in changes.rivals], "or")
-        found.append(Card("What else may it have been?", rivals, "These tests cannot tell them apart."))
+        test = changes.next_test
+        tell = "" if test is None else f" {sentence(next_test_line(test, control.unit))}"
+        found.append(Card("What else may it have been?", rivals, f"These tests cannot tell them apart.{tell}"))
     same = listed(list(dict.fromkeys(f"{spelled(u.name)} {u.parameter}".strip() for u in changes.unchanged)))
     if same:
         found.append(Card("What stayed as it was?", same, "A visible change of these would have shown."))
