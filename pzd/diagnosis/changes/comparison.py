@@ -396,7 +396,7 @@ class Findings:
         covariance = self.search.regression.covariance(best)
         # A model that misses a share of the force knows how the force follows a parameter to that share.
         missed = self.search.regression.likelihood.known_discrepancy * best.values
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2)
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + self._unnamed(best) ** 2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -411,6 +411,13 @@ class Findings:
                 found.append(self._change(mine, share))
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
+
+    def _unnamed(self, best: Fitted) -> Array:
+        """Return the (p,) standard error of the coordinates by what is left: the whole of it may be theirs."""
+        columns = self.search.regression.columns(best.coordinates, best.values)
+        squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self.comparisons, strict=True)]
+        slopes = np.sqrt(np.mean(squares, axis=0))
+        return np.where(slopes > 0.0, self.search.left(best) / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
 
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]

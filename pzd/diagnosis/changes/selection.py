@@ -327,11 +327,13 @@ class Search:
         return self._as_good(fitted, best) and AS_GOOD * self.left(fitted) <= self.left(less)
 
     def perhaps(self, best: Fitted) -> list[Fitted]:
-        """Return the fits with one change more that are nearly adopted, as rivals of nothing more."""
+        """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
         if len(best.candidates) >= MOST_CHANGES:
             return []
-        more = [f for f in self._additions(best) if f.bic - best.bic <= self.adopt_bic + self.rival_bic]
-        return [f for f in more if self._predicts(f, f.candidates[-1])]
+        more = [f for f in self._additions(best) if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
+        if not more or more[0].bic - best.bic > self.adopt_bic + self.rival_bic:
+            return []
+        return [f for f in more if f.bic <= more[0].bic + self.rival_bic]
 
     def _grouped(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with several of T0, C and k in the place of a gain, and a gain in the place of several."""
