@@ -331,9 +331,10 @@ class Search:
         if len(best.candidates) >= MOST_CHANGES:
             return []
         more = [f for f in self._additions(best) if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
-        if not more or more[0].bic - best.bic > self.adopt_bic + self.rival_bic:
+        enough = best.bic + self.adopt_bic + self.rival_bic
+        if not more or more[0].bic > enough:
             return []
-        return [f for f in more if f.bic <= more[0].bic + self.rival_bic]
+        return [f for f in more if f.bic <= max(enough, more[0].bic + self.rival_bic)]
 
     def _grouped(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with several of T0, C and k in the place of a gain, and a gain in the place of several."""
