@@ -193,7 +193,7 @@ class Search:
             max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
         ]
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def _continued(self, best: Fitted) -> Fitted:
         """Adopt changes as long as something visible is left and the criterion falls by enough."""
@@ -246,6 +246,14 @@ class Search:
     def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
         return self.size_of(fitted, candidate) >= self._least
 
+    def _over_tests(self, squares: Sequence[float]) -> float:
+        """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
+
+        What the damper of the first state misses of a test that it stands for would drown what the others show.
+        """
+        by_cycles = [s for s, c in zip(squares, self.regression.comparisons, strict=True) if c.before is not None]
+        return float(np.sqrt(np.mean(by_cycles or squares)))
+
     @property
     def _least(self) -> float:
         """R.m.s. force from which something counts, each test in units of its peak."""
@@ -262,7 +270,7 @@ class Search:
         for i, c in enumerate(self.regression.comparisons):
             missed = float(np.sum(self.regression.likelihood.missed_by_model(i)))
             squares.append((known**2 * float(c.difference @ c.difference) + missed) / c.peak**2)
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
         """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
@@ -274,7 +282,7 @@ class Search:
             float(np.sum((d - o) ** 2)) / c.peak**2
             for c, d, o in zip(self.regression.comparisons, fitted.differences, others, strict=True)
         ]
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def _predicts(self, fitted: Fitted, candidate: Candidate) -> bool:
         """Whether held-out tests are predicted better with a change than without, the rest fitted alike.
