@@ -385,6 +385,8 @@ class Findings:
 
     def refitted(self, candidates: Sequence[Candidate]) -> list[Change]:
         """Return the quantities of some candidates fitted together, whether they changed or not."""
+        if not candidates:
+            return []
         kept = [c for c in self.best.candidates if c in candidates]
         start = [self.best.values_of(c) if c in kept else np.array(c.starts[0]) for c in candidates]
         fitted = self.search.regression.fit(candidates, np.concatenate(start), self.best.scatter)

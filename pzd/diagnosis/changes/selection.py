@@ -215,7 +215,10 @@ class Search:
         return best
 
     def _without_superfluous(self, best: Fitted) -> Fitted:
-        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence."""
+        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence.
+
+        Of several changes that leave something visible, also one without which the others are as good.
+        """
         while best.candidates:
             fewer = [(self.without(best, c), c) for c in best.candidates]
             doubtful = [
@@ -224,7 +227,7 @@ class Search:
                 if best.bic - less.bic > self.adopt_bic
                 or not self._visible(best, c)
                 or not self._predicts(best, c)
-                or (not self.leaves_nothing(best) and self._as_good(less, best))
+                or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
             ]
             if not doubtful:
                 return best
