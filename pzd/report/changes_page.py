@@ -27,6 +27,7 @@ from pzd.report.blocks import (
     sentence,
     spelled,
 )
+from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render
 
@@ -64,7 +65,7 @@ def changes_page(found: Compared, control: Control) -> str:
     if found.undetermined:
         sections.append(Section("trust", "Not to be trusted", (Notes(found.undetermined, "care"),)))
     title = f"What changed from {changes.from_} to {changes.to}"
-    return render(title, _cards(changes), (), tuple(sections), _FOOTER)
+    return render(title, _cards(changes, control), (), tuple(sections), _FOOTER)
 
 
 def course_page(found: Followed, control: Control) -> str:
@@ -109,7 +110,7 @@ def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
     return Panel(figure, name, f"{name} over the states {', '.join(course.states)}, with 95 % intervals.", "")
 
 
-def _cards(changes: Changes) -> tuple[Card, ...]:
+def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
     names = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "damper")))
     stand = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "stand")))
     d = changes.difference
@@ -123,8 +124,10 @@ def _cards(changes: Changes) -> tuple[Card, ...]:
         found.append(Card("What did the stand do?", stand, "This is not the damper's."))
     if changes.rivals:
         rivals = listed([spelled(name) for name in changes.rivals], "or")
-        found.append(Card("What else may it have been?", rivals, "These tests cannot tell them apart."))
-    same = listed(list(dict.fromkeys(f"{spelled(u.name)} {u.parameter}".strip() for u in changes.unchanged)))
+        test = changes.next_test
+        tell = "" if test is None else f" {sentence(next_test_line(test, control.unit))}"
+        found.append(Card("What else may it have been?", rivals, f"These tests cannot tell them apart.{tell}"))
+    same = listed(list(dict.fromkeys(_quantity(u) for u in changes.unchanged)))
     if same:
         found.append(Card("What stayed as it was?", same, "A visible change of these would have shown."))
     return tuple(found)
@@ -137,12 +140,26 @@ def _quantities(changes: Changes, control: Control) -> TextTable:
     header = ("quantity", control.name, "before", "after", "95 % interval", "change", "in %", "share")
     listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
     rows = [row for each in listed_rows for row in _rows(each, control)]
-    return TextTable("Each quantity before and after; those without a share did not change", header, tuple(rows))
+    title = "Each quantity before and after; those without a share did not change"
+    return TextTable(title, *_without_control_where_none(header, rows))
+
+
+def _without_control_where_none(
+    header: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Leave out the second column, the control signal, where no row has one."""
+    if any(row[1] != DASH for row in rows):
+        return header, tuple(rows)
+    return (header[0], *header[2:]), tuple((row[0], *row[2:]) for row in rows)
+
+
+def _quantity(each: Change | Unchanged) -> str:
+    return spelled(each.name) if each.name == each.parameter else f"{spelled(each.name)} {each.parameter}"
 
 
 def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...]]:
     count = len(each.at_voltage_V) if each.at_voltage_V is not None else 1
-    name = spelled(each.name) if each.name == each.parameter else f"{spelled(each.name)} {each.parameter}"
+    name = _quantity(each)
     share = percent(each.share) if isinstance(each, Change) else DASH
     for i in range(count):
         start, to, low, high = (_at(values, i) for values in (each.from_, each.to, each.low95, each.high95))
@@ -171,7 +188,7 @@ def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
             cells += [amount(before, "N"), amount(after, "N"), percent((after - before) / abs(before))]
         at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
         rows.append((cycle.after, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
-    return TextTable("Force at the peak velocity of each test", header, tuple(rows))
+    return TextTable("Force at the peak velocity of each test", *_without_control_where_none(header, rows))
 
 
 # --- Pictures

@@ -20,6 +20,8 @@ _VERDICTS = {
 
 def changes_lines(found: Changes, control: Control) -> Iterator[str]:
     """Yield what changed as lines of the terminal."""
+    from pzd.report.diagnosis_text import next_test_line
+
     yield f"from {found.from_} to {found.to}: {found.verdict}: {_VERDICTS[found.verdict]}"
     yield f"  {found.reason}"
     for title, rows in (("changed", found.changes), ("unchanged", found.unchanged)):
@@ -27,6 +29,8 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
             yield f"{title}:"
         for row in rows:
             yield from (f"  {line}" for line in _lines(row, control))
+    if found.next_test:
+        yield next_test_line(found.next_test, control.unit)
 
 
 def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:

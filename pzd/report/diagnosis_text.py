@@ -67,7 +67,7 @@ def diagnosis_lines(
         lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
     lines += [*_rejected(diagnosis), *(_hypotheses(hypotheses) if hypotheses else ())]
     if diagnosis.next_test:
-        lines.append(_next(diagnosis.next_test, unit))
+        lines.append(next_test_line(diagnosis.next_test, unit))
     return lines
 
 
@@ -170,7 +170,8 @@ def _physics(row: HypothesisRow) -> str:
     return f"{row.physics} ({row.library} has this shape)" if row.library else row.physics
 
 
-def _next(test: NextTest, unit: str) -> str:
+def next_test_line(test: NextTest, unit: str) -> str:
+    """Return a proposed test as a line of the terminal."""
     voltages = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
     parts = [
         test.waveform,

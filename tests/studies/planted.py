@@ -69,6 +69,11 @@ def plants(records: Sequence[Record], share: float) -> Mapping[str, Mapping[str,
         "gas_spring": {"k_g": force / stroke},
         "fluid_inertia": {"m": force / acceleration},
         "stribeck_friction": {"F_s": force, "v_s": 0.2 * speed},
+        "end_stop": {"k_e": force / (0.3 * stroke) ** 2, "x_e": 0.7 * stroke},
+        "orifice_quadratic": {"q": force / speed**2},
+        "accumulator": {"F_g": force, "L": 3.0 * stroke},
+        "second_branch": {"T0_2": force, "k_2": force / (0.1 * stroke)},
+        "bouc_wen": {"F_h": force, "x_h": 0.1 * stroke, "sigma": 1.0},
     }
 
 

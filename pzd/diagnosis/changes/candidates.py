@@ -38,6 +38,8 @@ LARGEST_RATIO = 3.0
 FRICTION_STARTS = (0.0, -0.7, 1.5)
 RATIO_STARTS = (0.0, -1.2, 1.2)
 """Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
+DELAY_STARTS = (0.0, -0.6, 0.6)
+"""Where a fit of the delay begins [LARGEST_DELAY]: over a jump of dry friction no linearised step reaches far."""
 TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
@@ -91,6 +93,8 @@ class Candidate:
     """Starting values of a fit, (coordinates,) each."""
     absent: bool = False
     """Whether the first state does not have it: an effect that is newly there."""
+    flexible: bool = False
+    """Whether it is a law of several numbers that imitates others: asked where these leave something without a name."""
 
     @property
     def per_voltage(self) -> bool:
@@ -214,7 +218,7 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
         found.append(_warming(first.damper, max(map(abs, warmer))))
     for name, effect in {**library(), **fitted_laws()}.items():
         present = name in first.damper.effects
-        if name in NOT_HERE or (not present and (effect.never_named or name in fitted_laws())):
+        if name in NOT_HERE or (not present and name in fitted_laws()):
             continue
         if effect.needs is not None:
             continue
@@ -226,7 +230,9 @@ def _of_stand(name: str, force: float) -> Candidate:
     unit, most = STAND[name]
     scale = force if name == "load_cell_zero" else most
     limit = most / scale
-    return Candidate(name, "stand", (Coordinate(name, name, "stand", unit, scale, None, -limit, limit),), ((0.0,),))
+    starts = DELAY_STARTS if name == "recorder_delay" else (0.0,)
+    coordinate = Coordinate(name, name, "stand", unit, scale, None, -limit, limit)
+    return Candidate(name, "stand", (coordinate,), tuple((x,) for x in starts))
 
 
 def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Candidate]:
@@ -286,7 +292,7 @@ def _absent(first: FirstState, name: str) -> Candidate:
 
     grid = itertools.product(*(p.search.starts for p in known_effect(name).parameters))
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
-    return Candidate(name, "damper", tuple(coordinates), starts, absent=True)
+    return Candidate(name, "damper", tuple(coordinates), starts, True, bool(known_effect(name).never_named))
 
 
 def _present(first: FirstState, name: str) -> list[Candidate]:

@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from pzd.artefacts import Rig
+from pzd.artefacts import NextTest, Rig
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
 from pzd.damper.model import BaseRow
 from pzd.damper.parameter_rows import rows_per_voltage
@@ -38,11 +38,12 @@ from pzd.diagnosis.changes.regression import LEVEL, Fitted, Likelihood, Regressi
 from pzd.diagnosis.changes.selection import Search
 from pzd.diagnosis.changes.state import State, about, diagnosed_state
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array
-from pzd.rig.config import FilesEntry, RigConfig
+from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -56,6 +57,14 @@ POLYTROPIC = 1.3
 SHOWN = 0.3
 """Change of a coordinate that must be visible for a quantity to be told unchanged: a third of T0, C, k or the scale of
 an effect. What moves the force by less is not shown by the tests."""
+STAND_TESTS = {
+    "load_cell_zero": "rest, the load cell unloaded",
+    "load_cell_gain": "rest, a known weight on the load cell",
+    "recorder_delay": "sine, a steel spring in the place of the damper",
+}
+"""What tells a doing of the stand from one of the damper, without the damper."""
+NOTHING = ""
+"""In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
 """Shift of the mean displacement that is reported, as a share of the half stroke: an actuator centres so well."""
 
@@ -255,6 +264,10 @@ class Findings:
     def changes(self) -> Changes:
         """Return verdict and tables."""
         best, rivals = self._settled()
+        others = {
+            name: list(dict.fromkeys(each for fitted in fits for each in _added(fitted, best)))
+            for name, fits in rivals.items()
+        }
         difference = self.difference(best)
         reported = self._reported(best)
         zero = self._displacement_zero()
@@ -262,7 +275,7 @@ class Findings:
         verdict: Verdict = "changed" if of_damper else "unchanged"
         if rivals:
             verdict = "ambiguous"
-        if self._left_share(difference) > self.diagnose.unexplained_share and self._is_visible(difference):
+        if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
             verdict = "unexplained"
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
@@ -275,8 +288,9 @@ class Findings:
             difference=difference,
             changes=tuple(listed),
             unchanged=self._unchanged(best),
-            rivals=tuple(dict.fromkeys(name for names in rivals.values() for name in names)),
-            reason=self._reason(verdict, listed, rivals, difference),
+            rivals=tuple(dict.fromkeys(name for names in others.values() for name in names)),
+            reason=self._reason(verdict, listed, others, difference),
+            next_test=self._next_test(best, rivals),
         )
 
     def difference(self, best: Fitted) -> Difference:
@@ -305,27 +319,36 @@ class Findings:
         left = max(difference.left_N**2 - difference.noise_N**2, 0.0)
         return float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
 
-    def _is_visible(self, difference: Difference) -> bool:
-        """Whether what the states differ by is beyond noise, and beyond what two tests of one state differ by."""
-        beyond = max(difference.rms_N**2 - difference.noise_N**2, 0.0) ** 0.5
-        columns = self.search.regression.likelihood.columns
-        tests = float(np.sqrt(np.mean([np.sum((self.best.scatter.tests * A) ** 2) for A in columns])))
-        return bool(beyond > max(self.diagnose.visible * self.first.force, LEVEL * tests))
-
-    def _settled(self) -> tuple[Fitted, dict[str, list[str]]]:
+    def _settled(self) -> tuple[Fitted, dict[str, list[Fitted]]]:
         """Return the changes with those of the damper in the place of the stand's where something tells, and rivals."""
         best = self._gas(self.best)
-        rivals: dict[str, list[str]] = {}
+        rivals: dict[str, list[Fitted]] = {}
         for candidate in best.candidates:
-            names = [
-                name
-                for fitted in self.search.rivals(best, candidate)
-                for name in _added(fitted, best)
-                if not self._same_gas(best, candidate, name)
-            ]
-            if names:
-                rivals[candidate.name] = list(dict.fromkeys(names))
+            fits = [f for f in self.search.rivals(best, candidate) if not self._same_gas(best, candidate, f)]
+            if any(_added(f, best) for f in fits):
+                rivals[candidate.name] = fits
+        if perhaps := self.search.perhaps(best):
+            rivals[NOTHING] = perhaps
         return best, rivals
+
+    def _next_test(self, best: Fitted, rivals: dict[str, list[Fitted]]) -> NextTest | None:
+        """Return the test that tells the first change with rivals from these, in place or on the damper."""
+        if not rivals:
+            return None
+        name, fits = next(iter(rivals.items()))
+        named = {", ".join(_added(f, best)): f for f in reversed(fits) if _added(f, best)}
+        told = (name or "nothing", *reversed(named))
+        of_stand = [c.name for f in (best, *fits) for c in f.candidates if c.name in STAND_TESTS and c.name in told]
+        if of_stand:
+            waveform = STAND_TESTS[of_stand[0]]
+            return NextTest(waveform=waveform, frequency_Hz=None, amplitude_m=None, voltage_V=None, separates=told)
+        dampers = [
+            self.first.changed(f.coordinates, f.values.tolist(), None) for f in (best, *reversed(named.values()))
+        ]
+        prepared = (*self.before.prepared, *self.after.prepared)
+        voltages = [v for v in self._voltages() if v is not None]
+        envelope = operating_envelope(Limits(), prepared, voltages)
+        return separating_test(list(zip(told, dampers, strict=True)), envelope, self._temperatures()[0])
 
     def _gas(self, best: Fitted) -> Fitted:
         """Put a gas force in the place of a load-cell zero beside a gas spring that changed as that of a gas does."""
@@ -354,13 +377,16 @@ class Findings:
         half_stroke = max(c.amplitude for c in self.comparisons)
         return bool(GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke)
 
-    def _same_gas(self, best: Fitted, candidate: Candidate, rival: str) -> bool:
-        return candidate.name == "preload_offset" and rival == "load_cell_zero" and self._is_gas(best)
+    def _same_gas(self, best: Fitted, candidate: Candidate, rival: Fitted) -> bool:
+        zero = "load_cell_zero" in _added(rival, best)
+        return candidate.name == "preload_offset" and zero and self._is_gas(best)
 
     # --- Tables
 
     def refitted(self, candidates: Sequence[Candidate]) -> list[Change]:
         """Return the quantities of some candidates fitted together, whether they changed or not."""
+        if not candidates:
+            return []
         kept = [c for c in self.best.candidates if c in candidates]
         start = [self.best.values_of(c) if c in kept else np.array(c.starts[0]) for c in candidates]
         fitted = self.search.regression.fit(candidates, np.concatenate(start), self.best.scatter)
@@ -372,7 +398,7 @@ class Findings:
         covariance = self.search.regression.covariance(best)
         # A model that misses a share of the force knows how the force follows a parameter to that share.
         missed = self.search.regression.likelihood.known_discrepancy * best.values
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2)
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + self._unnamed(best) ** 2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -387,6 +413,13 @@ class Findings:
                 found.append(self._change(mine, share))
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
+
+    def _unnamed(self, best: Fitted) -> Array:
+        """Return the (p,) standard error of the coordinates by what is left: the whole of it may be theirs."""
+        columns = self.search.regression.columns(best.coordinates, best.values)
+        squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self.comparisons, strict=True)]
+        slopes = np.sqrt(np.mean(squares, axis=0))
+        return np.where(slopes > 0.0, self.search.left(best) / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
 
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]
@@ -538,6 +571,9 @@ class Findings:
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
         for name, others in rivals.items():
+            if name == NOTHING:
+                told.append(f"{' or '.join(others)} may have changed too, or what is left has no name")
+                continue
             told.append(f"{name} cannot be told from {' or '.join(others)} by these tests")
         if verdict == "unexplained":
             told.append("what is left has no name")

@@ -20,8 +20,6 @@ from pzd.record import Record, sliced
 from pzd.schema.errors import DataError
 from pzd.signals.cycles import cycles_of
 
-ALWAYS = ("T0", "C")
-"""Quantities that are followed whether they change or not, where the tests show them."""
 MOST_BLOCKS = 8
 """Blocks of cycles of a long test: as many points as a course needs."""
 CYCLES_OF_BLOCK = 2
@@ -60,8 +58,8 @@ def followed_over(
     first, *later = states
     found = [findings_between(first, state, diagnose, identify, control) for state in later]
     results = [each.changes() for each in found]
-    keys = _followed_keys(found)
-    rows = [*_quantities(found, keys, control), *_peak_forces(states, changes)]
+    adopted = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
+    rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes)]
     judged = [_judged(row, changes.tolerance) for row in rows]
     passes = [row.pass_ for row in judged if _limits(row, changes.tolerance) is not None]
     verdict = max((result.verdict for result in results), key=WORST.index)
@@ -87,18 +85,12 @@ def followed_over(
 # --- The quantities
 
 
-def _followed_keys(found: Sequence[Findings]) -> set[tuple[str, str]]:
-    """Return what is followed: every quantity of the damper that changed in any state, and T0 and C."""
-    adopted = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
-    return adopted | {(name, name) for name in ALWAYS}
-
-
-def _quantities(found: Sequence[Findings], keys: set[tuple[str, str]], control: Control) -> list[CourseRow]:
-    """Return the quantities over the states, fitted together in each."""
+def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], control: Control) -> list[CourseRow]:
+    """Return the quantities that changed in any state, T0 and C over the states, fitted together in each."""
     values: dict[tuple[str, str], list[tuple[Numbers, Numbers, Numbers]]] = {}
     starts: dict[tuple[str, str], tuple[Numbers, str, tuple[float, ...] | None]] = {}
     for number, each in enumerate(found):
-        for change in each.refitted(_together_with(each, keys)):
+        for change in each.refitted(_together_with(each, adopted)):
             key = (change.name, change.parameter)
             if key not in values:
                 values[key] = [(None, None, None)] * number
@@ -117,14 +109,16 @@ def _quantities(found: Sequence[Findings], keys: set[tuple[str, str]], control: 
     return rows
 
 
-def _together_with(found: Findings, keys: set[tuple[str, str]]) -> list[Candidate]:
-    """Return the candidates of a pair of states that are fitted together: its own, and the others that are followed."""
+def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candidate]:
+    """Return the candidates of a pair of states that are fitted together: its own, and the others that are followed.
+
+    T0 is always followed, C where it changed in any state or these two would have shown it.
+    """
     chosen = list(found.best.candidates)
-    shown = {(u.name, u.parameter) for u in found.changes().unchanged}
+    followed = adopted | {("T0", "T0")} | {(u.name, u.parameter) for u in found.changes().unchanged if u.name == "C"}
     for candidate in found.search.candidates:
         have = {key for c in chosen for key in c.key}
-        wanted = set(candidate.key) <= keys and not set(candidate.key) & have and not candidate.per_voltage
-        if wanted and (set(candidate.key) <= shown or candidate.name not in ALWAYS):
+        if set(candidate.key) <= followed and not set(candidate.key) & have and not candidate.per_voltage:
             chosen.append(candidate)
     return chosen
 

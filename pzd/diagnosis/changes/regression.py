@@ -41,6 +41,8 @@ STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
 """Evaluations of a fit at most; each is a simulation of all comparisons for each coordinate."""
+ROUNDS = 3
+"""Fits with the scatter that the last one left, at most."""
 LEVEL = 1.96
 """Half width of a 95 % interval in standard errors."""
 
@@ -105,14 +107,23 @@ class Likelihood:
         return np.asarray(alike * (BEYOND_TESTED * self.known_discrepancy) ** 2 * self._shapes[at][1])
 
     def own_of_tests(self, residuals: Sequence[Array], scatter: Scatter) -> list[Array]:
-        """Return (2 H + 1,) what of each residual the test's own offset, gain, delay and jumps explain [N]."""
-        found = []
+        """Return (2 H + 1,) what of each residual the test's own offset, gain, delay and jumps explain [N].
+
+        What all tests share beyond chance is none of their own.
+        """
+        columns, own = [], []
         for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
             U = np.column_stack([scatter.tests * A, self.comparisons[i].jumps])
             weighed = U / self.diagonal(i, scatter)[:, None]
-            mean = np.linalg.solve(np.eye(U.shape[1]) + U.T @ weighed, weighed.T @ r)
-            found.append(U @ np.clip(mean, -NUISANCE_LIMIT, NUISANCE_LIMIT))
-        return found
+            columns.append(U)
+            own.append(np.linalg.solve(np.eye(U.shape[1]) + U.T @ weighed, weighed.T @ r))
+        of_test = self.columns[0].shape[1]
+        shared = np.mean([mean[:of_test] for mean in own], axis=0)
+        chance = LEVEL / np.sqrt(len(own))
+        shared -= np.clip(shared, -chance, chance)
+        for mean in own:
+            mean[:of_test] -= shared
+        return [U @ np.clip(mean, -NUISANCE_LIMIT, NUISANCE_LIMIT) for U, mean in zip(columns, own, strict=True)]
 
     @cached_property
     def _products(self) -> tuple[Array, ...]:
@@ -231,7 +242,7 @@ class Regression:
             high = np.array([c.high for c in coordinates])
             margin = 1e-9 * np.where(np.isfinite(high - low), high - low, 1.0)
             x = np.clip(start, low + margin, high - margin)
-            for _ in range(2):
+            for _ in range(ROUNDS):
                 whiteners = self.likelihood.whiteners(scatter)
 
                 def residual(x: Array, whiteners: list[Array] = whiteners) -> Array:

@@ -31,6 +31,11 @@ EXCHANGES = 6
 """Rounds of the exchange at most; each lowers the criterion."""
 BETTER = 1e-3
 """Least improvement of the criterion: of two candidates that do the same the first in the list stays."""
+AS_GOOD = 2.0
+"""Multiple of what the best fit leaves up to which another one is as good: by the triangle inequality, what has no name
+may make either leave so much."""
+SCALED = (0.05, 3.0)
+"""Limits of the factor on a start by its linearised step."""
 FOLDS = 5
 """Parts into which the tests are dealt for the prediction of held-out ones."""
 
@@ -46,6 +51,14 @@ class Promise:
     """From which it was taken."""
 
 
+def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
+    """Return a start with its linear coordinates as large as the linearised step makes the difference from 0 to it."""
+    if step.size == start.size:  # no difference at the start itself
+        return start
+    linear = np.array([not c.logarithmic for c in candidate.coordinates])
+    return np.where(linear, start * np.clip(step[0], *SCALED), start)
+
+
 @dataclass(eq=False)
 class Search:
     """Search for the changes that explain the difference of force."""
@@ -58,6 +71,7 @@ class Search:
     """Least r.m.s. force of a change, as a share of each test's peak."""
     _starts: dict[Candidate, list[tuple[Array, list[Array]]]] = field(default_factory=dict, repr=False)
     _fits: dict[frozenset[Candidate], Fitted] = field(default_factory=dict, repr=False)
+    _flexible: bool = False
 
     def nothing(self) -> Fitted:
         """Return the fit without any change."""
@@ -88,9 +102,10 @@ class Search:
                 own = own / np.where(size > 0.0, size, 1.0)
                 if not np.all(np.isfinite(own)):
                     continue
-                left = r - own @ np.linalg.lstsq(own, r, rcond=1e-6)[0]
+                step = np.linalg.lstsq(own, r, rcond=1e-6)[0]
+                left = r - own @ step
                 if left @ left < best:
-                    best, at = float(left @ left), start
+                    best, at = float(left @ left), _scaled(candidate, start, step / np.where(size > 0.0, size, 1.0))
             penalty = len(candidate.coordinates) * float(np.log(self.regression.likelihood.size))
             found.append(Promise(best + penalty, candidate, at))
         return sorted(found, key=lambda promise: promise.criterion)
@@ -115,52 +130,74 @@ class Search:
         return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
 
     def _tried(self, before: Fitted) -> list[Candidate]:
-        return [c for c in self.candidates if not any(excludes(c, adopted) for adopted in before.candidates)]
+        asked = [c for c in self.candidates if self._flexible or not c.flexible]
+        return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
     def _additions(self, before: Fitted) -> list[Fitted]:
         """Return the fits with one more change that is visible and physical, the best first."""
         promising = self._promising(before, self._tried(before), before.scatter)
-        worth = [p for i, p in enumerate(promising) if i < FITTED or p.candidate.name in ELEMENT_COLUMNS]
+        worth = [
+            p
+            for i, p in enumerate(promising)
+            if i < FITTED or p.candidate.name in ELEMENT_COLUMNS or p.candidate.of == "stand"
+        ]
         # What leaves more of the force than its absence only fits where the scatter is thought to be small.
-        limit = self._left(before)
-        fits = [f for f in (self._with(before, p) for p in worth) if self._admissible(f) and self._left(f) < limit]
+        limit = self.left(before)
+        fits = [f for f in (self._with(before, p) for p in worth) if self._admissible(f) and self.left(f) < limit]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
     # --- The steps
 
     def run(self) -> Fitted:
+        """Return the changes that explain the difference.
+
+        Flexible laws are asked where the others leave something clearly visible, and believed where they leave nothing.
+        """
+        best = self._best_end()
+        if self.left(best) < AS_GOOD * self._least or not any(c.flexible for c in self.candidates):
+            return best
+        self._flexible = True
+        further = self._best_end()
+        self._flexible = self.leaves_nothing(further)
+        return further if self._flexible else best
+
+    def _best_end(self) -> Fitted:
         """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end.
 
         Of ends that leave nothing visible that with the fewest changes is the best: more of them may stand in for one.
         """
         nothing = self.nothing()
         ends = [self._without_superfluous(self._continued(self._exchanged(f))) for f in self._beginnings(nothing)]
-        enough = [f for f in ends if f.candidates and self._leaves_nothing(f)]
+        enough = [f for f in ends if f.candidates and self.leaves_nothing(f)]
         return min(enough or [nothing, *ends], key=lambda f: (len(f.candidates) if enough else 0, f.bic))
 
     def _beginnings(self, nothing: Fitted) -> list[Fitted]:
         """Return the best first changes; one alone where it leaves nothing visible."""
         found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
-        enough = [f for f in found if self._leaves_nothing(f)]
+        enough = [f for f in found if self.leaves_nothing(f)]
         return enough[:1] or found[:BEAM]
 
-    def _leaves_nothing(self, fitted: Fitted) -> bool:
+    def leaves_nothing(self, fitted: Fitted) -> bool:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
-        return self._left(fitted) < max(self.visible, self._hidden)
+        return self.left(fitted) < self._least
 
-    def _left(self, fitted: Fitted) -> float:
+    def _as_good(self, fitted: Fitted, best: Fitted) -> bool:
+        """Whether a fit leaves no more than the best one may leave in its direction."""
+        return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden)
+
+    def left(self, fitted: Fitted) -> float:
         """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks)."""
         own = self.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
         squares = [
             max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
         ]
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def _continued(self, best: Fitted) -> Fitted:
         """Adopt changes as long as something visible is left and the criterion falls by enough."""
-        while len(best.candidates) < MOST_CHANGES and not self._leaves_nothing(best):
+        while len(best.candidates) < MOST_CHANGES and not self.leaves_nothing(best):
             more = next(iter(self._additions(best)), None)
             if more is None or more.bic - best.bic > self.adopt_bic:
                 break
@@ -178,13 +215,19 @@ class Search:
         return best
 
     def _without_superfluous(self, best: Fitted) -> Fitted:
-        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence."""
+        """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence.
+
+        Of several changes that leave something visible, also one without which the others are as good.
+        """
         while best.candidates:
             fewer = [(self.without(best, c), c) for c in best.candidates]
             doubtful = [
                 less
                 for less, c in fewer
-                if best.bic - less.bic > self.adopt_bic or not self._visible(best, c) or not self._predicts(best, c)
+                if best.bic - less.bic > self.adopt_bic
+                or not self._visible(best, c)
+                or not self._predicts(best, c)
+                or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
             ]
             if not doubtful:
                 return best
@@ -204,7 +247,20 @@ class Search:
         return natural and self._visible(fitted, fitted.candidates[-1])
 
     def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
-        return self.size_of(fitted, candidate) >= max(self.visible, self._hidden)
+        return self.size_of(fitted, candidate) >= self._least
+
+    def _over_tests(self, squares: Sequence[float]) -> float:
+        """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
+
+        What the damper of the first state misses of a test that it stands for would drown what the others show.
+        """
+        by_cycles = [s for s, c in zip(squares, self.regression.comparisons, strict=True) if c.before is not None]
+        return float(np.sqrt(np.mean(by_cycles or squares)))
+
+    @property
+    def _least(self) -> float:
+        """R.m.s. force from which something counts, each test in units of its peak."""
+        return max(self.visible, self._hidden)
 
     @cached_property
     def _hidden(self) -> float:
@@ -217,7 +273,7 @@ class Search:
         for i, c in enumerate(self.regression.comparisons):
             missed = float(np.sum(self.regression.likelihood.missed_by_model(i)))
             squares.append((known**2 * float(c.difference @ c.difference) + missed) / c.peak**2)
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
         """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
@@ -229,7 +285,7 @@ class Search:
             float(np.sum((d - o) ** 2)) / c.peak**2
             for c, d, o in zip(self.regression.comparisons, fitted.differences, others, strict=True)
         ]
-        return float(np.sqrt(np.mean(squares)))
+        return self._over_tests(squares)
 
     def _predicts(self, fitted: Fitted, candidate: Candidate) -> bool:
         """Whether held-out tests are predicted better with a change than without, the rest fitted alike.
@@ -261,10 +317,35 @@ class Search:
         tried = [c for c in self._tried(less) if c.name != candidate.name]
         own = self._promising(less, [candidate], best.scatter)[0]
         limit = own.criterion + self.rival_bic + SLACK
-        promising = [p for p in self._promising(less, tried, best.scatter) if p.criterion < limit][: 2 * FITTED]
-        fits = [self._with(less, p) for p in promising]
+        promising = self._promising(less, tried, best.scatter)
+        worth = [p for i, p in enumerate(promising) if i < FITTED or (p.criterion < limit and i < 2 * FITTED)]
+        fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
-        return [fitted for fitted in fits if fitted.bic <= best.bic + self.rival_bic and self._admissible(fitted)]
+        near = [f for f in fits if self._is_rival(f, best, less)]
+        return [fitted for fitted in near if self._admissible(fitted)]
+
+    def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
+        """Whether a fit does what the best one does: nearly as likely, or as good where much has no name.
+
+        One with more numbers has to pay for them: else it is the same change told at greater length.
+        """
+        if fitted.values.size > best.values.size:
+            return fitted.bic <= best.bic
+        if fitted.bic <= best.bic + self.rival_bic:
+            return True
+        if self.left(best) < AS_GOOD * self._least:
+            return False
+        return self._as_good(fitted, best) and AS_GOOD * self.left(fitted) <= self.left(less)
+
+    def perhaps(self, best: Fitted) -> list[Fitted]:
+        """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
+        if len(best.candidates) >= MOST_CHANGES:
+            return []
+        more = [f for f in self._additions(best) if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
+        enough = best.bic + self.adopt_bic + self.rival_bic
+        if not more or more[0].bic > enough:
+            return []
+        return [f for f in more if f.bic <= max(enough, more[0].bic + self.rival_bic)]
 
     def _grouped(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with several of T0, C and k in the place of a gain, and a gain in the place of several."""

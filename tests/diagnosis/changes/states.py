@@ -11,7 +11,8 @@ from pzd.artefacts.changes import Changes
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.comparison import changes_between, findings_between
+from pzd.diagnosis.changes.regression import Likelihood
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
@@ -77,6 +78,12 @@ def found(before: Iterable[Record], after: Iterable[Record]) -> Changes:
     """What changed, the first state identified and not diagnosed."""
     states = state_of("new", before), state_of("aged", after)
     return changes_between(*states, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+
+
+def likelihood_between(before: Iterable[Record], after: Iterable[Record]) -> Likelihood:
+    """Likelihood of the differences between two states."""
+    states = state_of("new", before), state_of("aged", after)
+    return findings_between(*states, DiagnoseConfig(), IdentifyConfig(), Control()).search.regression.likelihood
 
 
 def scaled(damper: Damper, **factors: float) -> Damper:

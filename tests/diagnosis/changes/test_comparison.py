@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import campaign, drawn_damper, found, names, names_told, scaled
+from states import campaign, drawn_damper, found, likelihood_between, names, names_told, scaled
 
 from pzd.artefacts.changes import Change
 from pzd.damper.model import Damper
+from pzd.diagnosis.changes.regression import LEVEL, SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.record import Record
 from pzd.schema.errors import DataError
 
@@ -152,3 +153,51 @@ def test_the_result_does_not_hang_on_the_order_of_the_tests(
     forward, backward = found(before, after), found(before[::-1], after[::-1])
     assert names(forward) == names(backward)
     assert forward.changes[0].to == pytest.approx(backward.changes[0].to, rel=1e-3)
+
+
+def test_what_all_tests_share_is_none_of_their_own(rng: np.random.Generator) -> None:
+    """A gain of every test's own goes; the same gain in all of them stays, but for what chance may give."""
+    damper = drawn_damper(rng)
+    likelihood = likelihood_between(campaign(damper, rng), campaign(damper, rng))
+    scatter = Scatter(USUAL_SHARE, 0.0)
+    gains = [scatter.tests * columns[:, 1] for columns in likelihood.columns]
+    sides = [1.0 if i % 2 else -1.0 for i in range(len(gains))]
+    for signs, most in ((sides, 0.1), ([1.0] * len(gains), 1.0)):
+        residuals = [2.5 * sign * gain for sign, gain in zip(signs, gains, strict=True)]
+        left = [r - own for r, own in zip(residuals, likelihood.own_of_tests(residuals, scatter), strict=True)]
+        shares = [np.linalg.norm(rest) / np.linalg.norm(r) for rest, r in zip(left, residuals, strict=True)]
+        assert max(shares) <= most
+    chance = LEVEL / np.sqrt(len(gains))
+    assert shares == pytest.approx([1.0 - chance / 2.5] * len(shares), abs=0.05)
+
+
+def test_the_scatter_is_as_likely_by_determinant_and_inverse_of_the_covariance(rng: np.random.Generator) -> None:
+    """-2 ln L of a normal density, its matrix written out."""
+    damper = drawn_damper(rng)
+    likelihood = likelihood_between(campaign(damper, rng), campaign(damper, rng))
+    scatters = [Scatter(0.3, 0.0), Scatter(1.0, 0.2)]
+    residuals = [rng.standard_normal(c.difference.size) for c in likelihood.comparisons]
+    for scatter, found_here in zip(scatters, likelihood.deviances(residuals, scatters), strict=True):
+        direct = (np.log(scatter.tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
+        for i, (r, A) in enumerate(zip(residuals, likelihood.columns, strict=True)):
+            J = likelihood.comparisons[i].jumps
+            V = np.diag(likelihood.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T + J @ J.T
+            direct += r @ np.linalg.solve(V, r) + np.linalg.slogdet(V)[1]
+        assert found_here == pytest.approx(direct, rel=1e-7)
+
+
+def test_a_constant_alone_is_told_from_the_gas_with_the_load_cell_unloaded(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    changes = found(campaign(damper, rng), campaign(damper.with_effect("preload_offset", {"F_0": -60.0}), rng))
+    assert changes.verdict == "ambiguous"
+    assert {"load_cell_zero", "preload_offset"} <= names_told(changes)
+    assert changes.next_test is not None
+    assert "unloaded" in changes.next_test.waveform
+    assert {"load_cell_zero", "preload_offset"} <= set(changes.next_test.separates)
+
+
+def test_a_fluid_that_thins_beside_a_yield_that_rounds_is_named(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng).with_effect("rounded_yield", {"w_s": 0.01})
+    before = campaign(damper, rng)
+    changes = found(before, campaign(damper.with_effect("shear_thinning", {"n": 0.8}), rng))
+    assert "shear_thinning" in names_told(changes)
