@@ -1,42 +1,28 @@
 """Adoption: which of the selected effects the final damper has, judged by its prediction of held-out tests.
 
 An effect stays if held-out tests are predicted no worse with it. Where a law is missing that no name accounts for,
-weights by noise mislead: each law is bent towards what is missing, and takes other values on other tests. There effects
-are also added for what they predict alone. An effect is added if held-out tests are predicted better with it, beyond
-chance, and at no voltage worse; if the interpolation error at left-out voltages is not larger; and if the force
-half-way between two voltages passes `interpolation_check`. The verdict stays `unexplained`: what is added has no name.
-
-What is added may say better what an earlier effect stood in for, as a polytropic gas does for a parallel spring. Then
-the data no longer determine the parameters of that effect, and it is removed if held-out tests are predicted as well.
+effects are also added for what they predict alone, or take the place of others (`predictive_search.py`). The verdict
+stays `unexplained`: what is added has no name. It may say better what an earlier effect stood in for, as a polytropic
+gas does for a parallel spring; the earlier one then goes.
 """
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from pzd.artefacts import Prediction
-from pzd.damper.compose import respond
 from pzd.damper.effects import library
-from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis import thresholds
+from pzd.damper.model import against_nature
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
-from pzd.diagnosis.fit.least_squares import FitResult, refit
-from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
-from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.fit.least_squares import refit
+from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
-from pzd.diagnosis.search.determination import first_undetermined, showing, undetermined
-from pzd.record import Array
-from pzd.signals.measures import rms
-
-log = logging.getLogger(__name__)
+from pzd.diagnosis.search.determination import first_undetermined
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
@@ -222,21 +208,11 @@ def _rejection_reason(
     )
 
 
-# --- Addition of effects that improve the prediction
-
-
-@dataclass(frozen=True, eq=False)
-class _CriterionFit:
-    """A damper fitted by criterion (4), and its prediction errors."""
-
-    problem: Problem
-    fitted: FitResult
-    error: PredictionError
-    interpolation_error: PredictionError
+# --- Addition and exchange of effects that improve the prediction
 
 
 def add_predictive_effects(adoption: Adoption, validation: CrossValidation, config: DiagnoseConfig) -> Adoption:
-    """Add effects that improve the prediction of held-out tests, one after another, where a gap has no name.
+    """Add and exchange effects that improve the prediction of held-out tests, where a gap has no name.
 
     All fits are by criterion (4), every sample weighted alike.
 
@@ -254,175 +230,19 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
     found = validation.fit_by_criterion(selection.fitted.damper, validation.no_samples)
     if found is None:
         return adoption
-    added: list[Candidate] = []
-    current = _CriterionFit(*found, adoption.error, adoption.interpolation_error)
-    while validation.campaign.budget.allows_more():
-        better = _best_addition(current, validation, config, selection.adopted)
-        if better is None:
-            break
-        added.append(better[0])
-        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _name(added[-1]), better[1].error.criterion)
-        # What is off beside the new effect goes at once: something else may then explain what it had stood in for.
-        current = _without_off(_without_replaced(better[1], validation, config.force), validation, config.force)
-        off = tuple(name for name in better[1].fitted.effects if name not in current.fitted.effects)
-        config = config.model_copy(update={"forbid": (*config.forbid, *off)})
-    names = tuple(_name(each) for each in added if each.effect in current.fitted.effects)
-    if not names:
+    before = CriterionFit(*found, adoption.error, adoption.interpolation_error)
+    search = PredictiveSearch(validation, config, len(selection.adopted) + config.most_added)
+    final = search.improve(before)
+    if final is before:
         return adoption
-    new = {each.effect: ADDED for each in added if each.effect not in selection.adopted}
-    gone = dict.fromkeys({*selection.adopted, *new} - {*current.fitted.effects}, REPLACED)
+    had, has = (effect_names(each.fitted.damper) for each in (before, final))
+    new = {name: ADDED for name in final.fitted.effects if name not in selection.adopted}
+    gone = dict.fromkeys({*selection.adopted} - {*final.fitted.effects}, REPLACED)
     extended = replace(
         selection,
-        fitted=current.fitted,
-        final_evidence=replace(selection.final_evidence, whole=current.problem),
+        fitted=final.fitted,
+        final_evidence=replace(selection.final_evidence, whole=final.problem),
         reasons={**selection.reasons, **new, **gone},
     )
-    errors = adoption.baseline_error, current.error, current.interpolation_error
-    return Adoption(extended, *errors, by_criterion=True, added=names)
-
-
-def _name(added: Candidate) -> str:
-    return f"{added.effect} by voltage" if added.varies else added.effect
-
-
-def _best_addition(
-    current: _CriterionFit, validation: CrossValidation, config: DiagnoseConfig, adopted: Sequence[str]
-) -> tuple[Candidate, _CriterionFit] | None:
-    """Return the candidate that predicts best among those that fit best; None where none improves the prediction."""
-    tried = _possible_additions(current, config, adopted)
-    better = []
-    for each in sorted(tried, key=lambda c: c.delta_bic)[: thresholds.CROSS_VALIDATED_CANDIDATES]:
-        error = validation.error_by_criterion(each.fitted.damper)
-        if _improves(error, current.error, validation):
-            better.append((each, error))
-    for each, error in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
-        between = validation.interpolation_error(each.fitted.damper, by_criterion=True)
-        if current.interpolation_error.visibly_below(between):
-            continue
-        found = validation.fit_by_criterion(each.fitted.damper, validation.no_samples)
-        if found is not None and interpolation_check(found[1].damper, validation):
-            return each, _CriterionFit(*found, error, between)
-    return None
-
-
-def _possible_additions(current: _CriterionFit, config: DiagnoseConfig, adopted: Sequence[str]) -> Iterator[Candidate]:
-    """Yield candidates with possible values: a new effect each, or an adopted one with its parameters per voltage.
-
-    Effects of the sensor are not tried: no ride depends on them, and a delay fits any hysteresis a little. Nor is what
-    begins at some displacement: it would grow beyond the recorded stroke, where no test shows it.
-    """
-    problem, fitted = current.problem, current.fitted
-    found: list[Candidate] = per_voltage_candidates(problem, fitted)
-    if len({*fitted.effects} - {*adopted}) < config.most_added:
-        new = [
-            effect
-            for effect in library().values()
-            if effect.name not in (*fitted.effects, *config.forbid)
-            and effect.place != "sensor"
-            and not effect.needs_displacement_zero
-            and testable(problem, effect)
-        ]
-        for effect in most_promising(problem, fitted, new, thresholds.SCREENED_EFFECTS):
-            own = problem.with_friction_scaling(effect)
-            found.append(replace(candidate(own, fitted, effect), varies=own is not problem))
-    visible = (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
-    return (c for c in visible if c.effect not in undetermined(problem, c.fitted))
-
-
-def _improves(one: PredictionError, other: PredictionError, validation: CrossValidation) -> bool:
-    """Whether held-out tests are predicted better, visibly and beyond chance, and at no voltage worse."""
-    if one.criterion is None or other.criterion is None:
-        return False
-    less = one.criterion <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * other.criterion
-    return less and bool(validation.better_at(one, other)) and not validation.worse_at(one, other)
-
-
-def _without_replaced(current: _CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> _CriterionFit:
-    """Remove effects that the data do not determine beside the others, and that the prediction does not need."""
-    while True:
-        fewer = []
-        for name in _removable(current.fitted):
-            if name in forced:
-                continue
-            damper = current.fitted.damper.without_effects(name)
-            error = validation.error_by_criterion(damper)
-            found = validation.fit_by_criterion(damper, validation.no_samples)
-            if found is None or _improves(current.error, error, validation):
-                continue
-            if interpolation_check(found[1].damper, validation):
-                fewer.append((*found, error))
-        if not fewer:
-            return current
-        problem, fitted, error = min(fewer, key=lambda each: each[2].criterion or 0.0)
-        between = validation.interpolation_error(fitted.damper, by_criterion=True)
-        current = _CriterionFit(problem, fitted, error, between)
-
-
-def _without_off(current: _CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> _CriterionFit:
-    """Remove effects that may as well be off beside what was added, whatever they predict; the rest is refitted.
-
-    Within the tests such an effect does little either way; beyond them, as a stop at the end of the stroke, anything.
-    """
-    while True:
-        shown = showing(current.fitted)
-        off = next((name for name in current.fitted.effects if name not in shown and name not in forced), None)
-        damper = current.fitted.damper.without_effects(off or "")
-        found = validation.fit_by_criterion(damper, validation.no_samples) if off else None
-        if found is None:
-            return current
-        between = validation.interpolation_error(found[1].damper, by_criterion=True)
-        current = _CriterionFit(*found, validation.error_by_criterion(damper), between)
-
-
-def _removable(fitted: FitResult) -> list[str]:
-    """Return the effects whose strength may as well be zero, or with impossible values."""
-    shown, odd = showing(fitted), against_nature(fitted.damper)
-    return [name for name in fitted.effects if (name not in shown or name in odd) and len(fitted.effects) > 1]
-
-
-# --- Check of the force half-way between two tested voltages
-#
-# No test shows it, and neither does the interpolation error: that is of voltages twice as far apart. T0, C and k are
-# linear between voltages, and the force nearly so. An effect whose parameters differ by voltage may leave that line
-# where the tests of one voltage hardly determine them: each set of values predicts its own tests, and what lies between
-# two sets is no damper.
-
-
-TOLERANCE = 1e-5
-"""Tolerance of the simulation, as a share of the force.
-
-Reason: far below the shares that are compared."""
-
-
-def interpolation_check(damper: Damper, validation: CrossValidation) -> bool:
-    """Whether the force half-way between neighbouring voltages lies near the mean of those at either, in their tests.
-
-    Equation: rms(F((u + w)/2) - (F(u) + F(w))/2) <= s rms(F(w) - F(u)), s = 1/4
-
-    Parameters
-    ----------
-    damper : with the effects to be tried
-    validation : whose tests at constant voltage are simulated at both voltages and half-way
-    """
-    groups = {v: group for v, group in zip(validation.voltages, validation.groups, strict=True) if v is not None}
-    return all(
-        _near_mean_force(damper, validation, record, low, high)
-        for low, high in pairwise(sorted(groups))
-        for record in (*groups[low], *groups[high])
-    )
-
-
-def _near_mean_force(damper: Damper, validation: CrossValidation, record: int, low: float, high: float) -> bool:
-    prepared = validation.campaign.prepared[record]
-    motion, samples = simulation_motion(prepared.record)
-
-    def force(voltage: float) -> Array:
-        """Compute the force at another voltage, where it does not depend on how the test began."""
-        fixed_voltage = replace(motion, voltage=np.full(motion.time.size, voltage))
-        found = respond(damper, fixed_voltage, float(prepared.record.force[0]), TOLERANCE)
-        return found[samples][comparable_samples(prepared)]
-
-    below, half_way, above = force(low), force(0.5 * (low + high)), force(high)
-    off = rms(half_way - 0.5 * (below + above))
-    seen = validation.visible * float(max(np.max(np.abs(below)), np.max(np.abs(above))))
-    return off <= max(thresholds.INTERPOLATION_DEPARTURE * rms(above - below), seen)
+    errors = adoption.baseline_error, final.error, final.interpolation_error
+    return Adoption(extended, *errors, by_criterion=True, added=tuple(name for name in has if name not in had))

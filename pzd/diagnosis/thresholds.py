@@ -145,7 +145,7 @@ CANCELLED_SHARE = 0.1
 
 Reason: an error of a tenth in either is then as large as what both do together; not tuned."""
 
-# --- When an effect is added for its prediction alone (adoption.py)
+# --- When an effect is added for its prediction alone (predictive_search.py)
 
 LEAST_PREDICTION_GAIN = 0.05
 """Share by which an added effect must lower the pooled W_s of held-out tests.
@@ -155,8 +155,12 @@ SCREENED_EFFECTS = 5
 """Effects that are fitted: those with the largest promised drop of the misfit.
 
 Reason: time; on configs/utfsm.yaml the effect that predicts best is among the first three."""
+EXCHANGED_EFFECTS = 3
+"""Effects that are fitted in the place of an adopted one: those with the largest promised drop of the misfit.
+
+Reason: time; it is asked for every adopted effect. Not tuned."""
 CROSS_VALIDATED_CANDIDATES = 3
-"""Candidates that are cross-validated: those that fit best.
+"""Candidates that are cross-validated: those that predict best to first order.
 
 Reason: time; each takes as many refits as there are folds."""
 INTERPOLATION_DEPARTURE = 0.25

@@ -13,11 +13,12 @@ from synthetic import TWO, all_but, campaign_of, damper_of, sine, sines
 
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis.adoption import ADDED, REPLACED, Adoption, add_predictive_effects, adopt_effects, interpolation_check
+from pzd.diagnosis.adoption import ADDED, REPLACED, Adoption, add_predictive_effects, adopt_effects
 from pzd.diagnosis.campaign import Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.predictive_search import interpolation_check
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import candidates, per_voltage_candidates, starts_of
 from pzd.record import Record

@@ -10,12 +10,13 @@ from synthetic import TWO, campaign_of, damper_of, problem_of, sine, sines
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnosis.adoption import _CriterionFit, _without_off, adopt_effects
+from pzd.diagnosis.adoption import adopt_effects
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.fit.least_squares import FitResult, fit
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.predictive_search import CriterionFit, without_off
 from pzd.diagnosis.search.acceptance import Selection, insufficient_support
 from pzd.diagnosis.search.candidates import as_candidate, starts_of
 from pzd.diagnosis.search.determination import (
@@ -146,6 +147,6 @@ def test_what_may_be_off_beside_what_was_added_is_not_handed_on(rng: np.random.G
     found = validation.fit_by_criterion(both, validation.no_samples)
     assert found is not None
     error = validation.error_by_criterion(both)
-    current = _CriterionFit(*found, error, error)
-    assert set(_without_off(current, validation, ()).fitted.effects) == {"gas_spring"}
-    assert set(_without_off(current, validation, ("end_stop",)).fitted.effects) == {"gas_spring", "end_stop"}
+    current = CriterionFit(*found, error, error)
+    assert set(without_off(current, validation, ()).fitted.effects) == {"gas_spring"}
+    assert set(without_off(current, validation, ("end_stop",)).fitted.effects) == {"gas_spring", "end_stop"}

@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import Effect, Parameter, Scales, Search
+from pzd.damper.effect import NODE_VOLTAGES, Effect, Parameter, Scales, Search
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
@@ -161,6 +161,13 @@ class Problem:
             o if o.base_row < 0 else replace(o, base_row=place[id(self.base[o.base_row])]) for o in self.observations
         )
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
+
+    def started_at(self, damper: Damper) -> Problem:
+        """Return the problem with the base rows of a damper as starting values, and its effects per voltage."""
+        by_voltage = frozenset(name for name, values in damper.effects.items() if NODE_VOLTAGES in values)
+        reference = damper.reference_temperature_degC
+        kept = self.reference_temperature if reference is None else reference
+        return replace(self, base=damper.base, per_voltage=by_voltage, reference_temperature=kept)
 
     def with_friction_scaling(self, effect: Effect) -> Problem:
         """Return the problem with an effect's parameters per voltage if they scale with T0."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -35,14 +35,39 @@ def sorted_starts(problem: Problem, before: FitResult, effect: Effect) -> list[A
     return [starts[i] for i in np.argsort(promised, kind="stable")]
 
 
-def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect], count: int) -> list[Effect]:
-    """Return the effects from whose starting values one linearised step promises the smallest misfits, best first."""
-    promised = []
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What one linearised step promises of an effect from its most promising starting values."""
+
+    effect: Effect
+    problem: Problem
+    """With the parameters of the effect per voltage, if they scale with T0."""
+    start: Array
+    """In the units of the search."""
+    misfit: float
+
+
+def most_promising(
+    problem: Problem, before: FitResult, effects: Sequence[Effect], reached: Mapping[str, Array] | None = None
+) -> list[Promise]:
+    """Return what one linearised step promises of some effects, the smallest misfits first.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effects : to be tried
+    reached : values that an earlier search of an effect reached, by its name: they take the place of its starts
+    """
+    promises = []
     for effect in effects:
-        own = problem.with_friction_scaling(effect)
+        own, values = problem.with_friction_scaling(effect), (reached or {}).get(effect.name)
         starts = starts_of(own, before, effect)
-        promised.append(min(_promised_misfit(own, before, effect, start) for start in starts))
-    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
+        starts = starts if values is None or values.size != starts[0].size else [values]
+        found = [(_promised_misfit(own, before, effect, start), start) for start in starts]
+        misfit, start = min(found, key=lambda each: each[0])
+        promises.append(Promise(effect, own, start, misfit))
+    return sorted(promises, key=lambda each: each.misfit)
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
@@ -189,17 +214,17 @@ def resumed(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
     return _fitted_from(_problem_for(problem, known()[found.effect]), before, found.effect, found.fitted.optimum)
 
 
-def candidate(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
-    """Fit one effect beside those of `before`, from its most promising starting values.
+def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array | None = None) -> Candidate:
+    """Fit one effect beside those of `before`, from its most promising starting values, or those that are given.
 
     Others, then ever fainter ones, are tried only while the fit is worse than without the effect: such a search got
     stuck, for being switched off is one of the effect's own values.
     """
     problem, reached = _problem_for(problem, effect), list[Candidate]()
-    starts = sorted_starts(problem, before, effect)
+    starts = sorted_starts(problem, before, effect) if start is None else [start]
     faint = (towards_neutral(problem, before, effect, starts[0], share) for share in thresholds.SMALLER_STARTS)
-    for start in itertools.chain(starts[: thresholds.STARTS_TRIED], faint):
-        whole_start = np.concatenate([_search_start(problem, before), start])
+    for each in itertools.chain(starts[: thresholds.STARTS_TRIED], faint):
+        whole_start = np.concatenate([_search_start(problem, before), each])
         reached.append(_fitted_from(problem, before, effect.name, whole_start, thresholds.FIRST_EVALUATIONS))
         fitted = reached[-1].fitted
         if fitted.misfit <= before.misfit + thresholds.STUCK_MISFIT or _switched_off(effect, fitted):

@@ -1,0 +1,268 @@
+"""Search for the effects with which held-out tests are predicted best, where a gap has no name.
+
+Weights by noise mislead there: each law is bent towards what is missing, and takes other values on other tests. So all
+fits are by criterion (4), every sample weighted alike, and what decides is the prediction error of tests held out of
+the fit. The search adds an effect, or lets one differ by voltage; where no addition helps it exchanges an adopted
+effect for another, or for two. A step is taken if held-out tests are predicted better, beyond chance, and at no voltage
+worse; if the interpolation error at left-out voltages is not larger; and if the force half-way between two voltages
+passes `interpolation_check`. What is off, or that the prediction does not need, beside the new effect goes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pzd.damper.compose import respond
+from pzd.damper.effect import NODE_VOLTAGES
+from pzd.damper.effects import library
+from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis import thresholds
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
+from pzd.diagnosis.fit.least_squares import FitResult
+from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
+from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
+from pzd.diagnosis.search.determination import showing, undetermined
+from pzd.record import Array
+from pzd.signals.measures import rms
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class CriterionFit:
+    """A damper fitted by criterion (4), and its prediction errors."""
+
+    problem: Problem
+    fitted: FitResult
+    error: PredictionError
+    """Of held-out tests."""
+    interpolation_error: PredictionError
+    """Of left-out voltages."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A damper that a step of the search may go to, and its prediction error to first order."""
+
+    problem: Problem
+    fitted: FitResult
+    estimate: float
+    """W_s of held-out tests, see `CrossValidation.error_to_first_order`."""
+
+
+@dataclass(eq=False)
+class PredictiveSearch:
+    """The search of one campaign: what it may try, and what it remembers of effects that it tried before."""
+
+    validation: CrossValidation
+    config: DiagnoseConfig
+    most_effects: int
+    """That the damper may have."""
+    reached: dict[str, Array] = field(default_factory=dict)
+    """Values in the units of the search that the last fit of an effect reached: where the next one starts."""
+    off: set[str] = field(default_factory=set)
+    """Effects that were off beside an added one: they are not tried again."""
+
+    def improve(self, current: CriterionFit) -> CriterionFit:
+        """Add and exchange effects until nothing improves the prediction or the budget is spent."""
+        while self.validation.campaign.budget.allows_more():
+            better = self._best(current, self._additions(current.problem, current.fitted))
+            if better is None:
+                better = self._best(current, self._exchanges(current))
+            if better is None:
+                return current
+            log.info("diagnose: %s, W_s of kept-back tests %.4g", _names(better), better.error.criterion)
+            # What is off beside the new effect goes at once: something else may explain what it had stood in for.
+            needed = without_replaced(better, self.validation, self.config.force)
+            current = without_off(needed, self.validation, self.config.force)
+            self.off |= {*better.fitted.effects} - {*current.fitted.effects}
+        return current
+
+    def _best(self, current: CriterionFit, tried: Sequence[_Trial]) -> CriterionFit | None:
+        """Return what predicts best of those that promise to; None where none improves the prediction."""
+        here = self.validation.error_to_first_order(current.problem, current.fitted)
+        promising = sorted((each for each in tried if each.estimate < here), key=lambda each: each.estimate)
+        better = []
+        for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
+            error = self.validation.error_by_criterion(each.fitted.damper)
+            if improves(error, current.error, self.validation):
+                better.append((each, error))
+        for each, error in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
+            between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
+            if current.interpolation_error.visibly_below(between):
+                continue
+            found = self.validation.fit_by_criterion(each.fitted.damper, self.validation.no_samples)
+            if found is not None and interpolation_check(found[1].damper, self.validation):
+                return CriterionFit(*found, error, between)
+        return None
+
+    def _additions(self, problem: Problem, fitted: FitResult) -> list[_Trial]:
+        """Return what a further effect gives, or an adopted one with its parameters per voltage."""
+        found = per_voltage_candidates(problem, fitted)
+        found += self._further(problem, fitted, thresholds.SCREENED_EFFECTS)
+        return self._possible(problem, found)
+
+    def _further(self, problem: Problem, fitted: FitResult, count: int, barred: Sequence[str] = ()) -> list[Candidate]:
+        """Fit the most promising effects beside those of a fit.
+
+        What begins at some displacement is not tried: it would grow beyond the recorded stroke, where no test shows it.
+        """
+        if len(fitted.effects) >= self.most_effects:
+            return []
+        barred = (*fitted.effects, *self.config.forbid, *self.off, *barred)
+        new = [
+            effect
+            for effect in library().values()
+            if effect.name not in barred and not effect.needs_displacement_zero and testable(problem, effect)
+        ]
+        found = []
+        for promise in most_promising(problem, fitted, new, self.reached)[:count]:
+            tried = candidate(promise.problem, fitted, promise.effect, promise.start)
+            self.reached[promise.effect.name] = tried.fitted.optimum[fitted.optimum.size :]
+            found.append(replace(tried, varies=promise.problem is not problem))
+        return found
+
+    def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Trial]:
+        """Return the candidates that move the force visibly, with values that nature has and the tests determine."""
+        trials = []
+        for each in found:
+            if each.explained < self.config.visible or against_nature(each.fitted.damper):
+                continue
+            own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
+            if each.effect not in undetermined(own, each.fitted):
+                estimate = self.validation.error_to_first_order(own, each.fitted)
+                trials.append(_Trial(own, each.fitted, estimate))
+        return trials
+
+    def _exchanges(self, current: CriterionFit) -> list[_Trial]:
+        """Return what another effect gives in the place of an adopted one, and two in the place of the best such."""
+        trials: list[_Trial] = []
+        for name in current.fitted.effects if len(current.fitted.effects) > 1 else ():
+            if name in self.config.force:
+                continue
+            found = self.validation.fit_by_criterion(
+                current.fitted.damper.without_effects(name), self.validation.no_samples
+            )
+            if found is not None:
+                trials += self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
+        if not trials:
+            return []
+        best = min(trials, key=lambda each: each.estimate)
+        gone = tuple({*current.fitted.effects} - {*best.fitted.effects})
+        two = self._further(best.problem, best.fitted, thresholds.EXCHANGED_EFFECTS, gone)
+        return trials + self._possible(best.problem, two)
+
+
+def _names(found: CriterionFit) -> str:
+    return " and ".join(effect_names(found.fitted.damper))
+
+
+def effect_names(damper: Damper) -> list[str]:
+    """Return the effects of a damper, those `by voltage` that differ by it."""
+    return [f"{name} by voltage" if NODE_VOLTAGES in values else name for name, values in damper.effects.items()]
+
+
+def improves(one: PredictionError, other: PredictionError, validation: CrossValidation) -> bool:
+    """Whether held-out tests are predicted better, visibly and beyond chance, and at no voltage worse."""
+    if one.criterion is None or other.criterion is None:
+        return False
+    less = one.criterion <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * other.criterion
+    return less and bool(validation.better_at(one, other)) and not validation.worse_at(one, other)
+
+
+def without_replaced(current: CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> CriterionFit:
+    """Remove effects that the data do not determine beside the others, and that the prediction does not need."""
+    while True:
+        fewer = []
+        for name in _removable(current.fitted):
+            if name in forced:
+                continue
+            damper = current.fitted.damper.without_effects(name)
+            error = validation.error_by_criterion(damper)
+            found = validation.fit_by_criterion(damper, validation.no_samples)
+            if found is None or improves(current.error, error, validation):
+                continue
+            if interpolation_check(found[1].damper, validation):
+                fewer.append((*found, error))
+        if not fewer:
+            return current
+        problem, fitted, error = min(fewer, key=lambda each: each[2].criterion or 0.0)
+        between = validation.interpolation_error(fitted.damper, by_criterion=True)
+        current = CriterionFit(problem, fitted, error, between)
+
+
+def without_off(current: CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> CriterionFit:
+    """Remove effects that may as well be off beside what was added, whatever they predict; the rest is refitted.
+
+    Within the tests such an effect does little either way; beyond them, as a stop at the end of the stroke, anything.
+    """
+    while True:
+        shown = showing(current.fitted)
+        off = next((name for name in current.fitted.effects if name not in shown and name not in forced), None)
+        damper = current.fitted.damper.without_effects(off or "")
+        found = validation.fit_by_criterion(damper, validation.no_samples) if off else None
+        if found is None:
+            return current
+        between = validation.interpolation_error(found[1].damper, by_criterion=True)
+        current = CriterionFit(*found, validation.error_by_criterion(damper), between)
+
+
+def _removable(fitted: FitResult) -> list[str]:
+    """Return the effects whose strength may as well be zero, or with impossible values."""
+    shown, odd = showing(fitted), against_nature(fitted.damper)
+    return [name for name in fitted.effects if (name not in shown or name in odd) and len(fitted.effects) > 1]
+
+
+# --- Check of the force half-way between two tested voltages
+#
+# No test shows it, and neither does the interpolation error: that is of voltages twice as far apart. T0, C and k are
+# linear between voltages, and the force nearly so. An effect whose parameters differ by voltage may leave that line
+# where the tests of one voltage hardly determine them: each set of values predicts its own tests, and what lies between
+# two sets is no damper.
+
+
+TOLERANCE = 1e-5
+"""Tolerance of the simulation, as a share of the force.
+
+Reason: far below the shares that are compared."""
+
+
+def interpolation_check(damper: Damper, validation: CrossValidation) -> bool:
+    """Whether the force half-way between neighbouring voltages lies near the mean of those at either, in their tests.
+
+    Equation: rms(F((u + w)/2) - (F(u) + F(w))/2) <= s rms(F(w) - F(u)), s = 1/4
+
+    Parameters
+    ----------
+    damper : with the effects to be tried
+    validation : whose tests at constant voltage are simulated at both voltages and half-way
+    """
+    groups = {v: group for v, group in zip(validation.voltages, validation.groups, strict=True) if v is not None}
+    return all(
+        _near_mean_force(damper, validation, record, low, high)
+        for low, high in pairwise(sorted(groups))
+        for record in (*groups[low], *groups[high])
+    )
+
+
+def _near_mean_force(damper: Damper, validation: CrossValidation, record: int, low: float, high: float) -> bool:
+    prepared = validation.campaign.prepared[record]
+    motion, samples = simulation_motion(prepared.record)
+
+    def force(voltage: float) -> Array:
+        """Compute the force at another voltage, where it does not depend on how the test began."""
+        fixed_voltage = replace(motion, voltage=np.full(motion.time.size, voltage))
+        found = respond(damper, fixed_voltage, float(prepared.record.force[0]), TOLERANCE)
+        return found[samples][comparable_samples(prepared)]
+
+    below, half_way, above = force(low), force(0.5 * (low + high)), force(high)
+    off = rms(half_way - 0.5 * (below + above))
+    seen = validation.visible * float(max(np.max(np.abs(below)), np.max(np.abs(above))))
+    return off <= max(thresholds.INTERPOLATION_DEPARTURE * rms(above - below), seen)
