@@ -11,7 +11,7 @@ passes `interpolation_check`. What is off, or that the prediction does not need,
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -24,7 +24,7 @@ from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
-from pzd.diagnosis.fit.least_squares import FitResult
+from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
@@ -69,13 +69,13 @@ class PredictiveSearch:
     """Values in the units of the search that the last fit of an effect reached: where the next one starts."""
     off: set[str] = field(default_factory=set)
     """Effects that were off beside an added one: they are not tried again."""
+    bent: set[str] = field(default_factory=set)
+    """Effects that go wrong between voltages beside those of the current damper: not tried before it is another."""
 
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
         while self.validation.campaign.budget.allows_more():
-            better = self._best(current, self._additions(current.problem, current.fitted))
-            if better is None:
-                better = self._best(current, self._exchanges(current))
+            better = next(filter(None, (self._best(current, trials) for trials in self._neighbours(current))), None)
             if better is None:
                 return current
             log.info("diagnose: %s, W_s of kept-back tests %.4g", _names(better), better.error.criterion)
@@ -83,7 +83,18 @@ class PredictiveSearch:
             needed = without_replaced(better, self.validation, self.config.force)
             current = without_off(needed, self.validation, self.config.force)
             self.off |= {*better.fitted.effects} - {*current.fitted.effects}
+            self.bent.clear()
         return current
+
+    def _neighbours(self, current: CriterionFit) -> Iterator[list[_Trial]]:
+        """Yield what a step may go to: one effect more, two more, another in the place of one; each if asked for."""
+        added = self._additions(current.problem, current.fitted)
+        yield added
+        sound = [each for each in added if self.bent.isdisjoint(each.fitted.effects)]
+        if sound:
+            first = min(sound, key=lambda each: each.estimate)
+            yield self._additions(first.problem, first.fitted)
+        yield self._exchanges(current)
 
     def _best(self, current: CriterionFit, tried: Sequence[_Trial]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
@@ -96,11 +107,11 @@ class PredictiveSearch:
                 better.append((each, error))
         for each, error in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
             between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
-            if current.interpolation_error.visibly_below(between):
-                continue
             found = self.validation.fit_by_criterion(each.fitted.damper, self.validation.no_samples)
-            if found is not None and interpolation_check(found[1].damper, self.validation):
+            bends = current.interpolation_error.visibly_below(between)
+            if found is not None and not bends and interpolation_check(found[1].damper, self.validation):
                 return CriterionFit(*found, error, between)
+            self.bent |= {*each.fitted.effects} - {*current.fitted.effects}
         return None
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Trial]:
@@ -116,7 +127,7 @@ class PredictiveSearch:
         """
         if len(fitted.effects) >= self.most_effects:
             return []
-        barred = (*fitted.effects, *self.config.forbid, *self.off, *barred)
+        barred = (*fitted.effects, *self.config.forbid, *self.off, *self.bent, *barred)
         new = [
             effect
             for effect in library().values()
@@ -141,6 +152,11 @@ class PredictiveSearch:
                 trials.append(_Trial(own, each.fitted, estimate))
         return trials
 
+    def _searched_on(self, trial: _Trial) -> _Trial:
+        """Return a trial at its optimum: candidates are fitted in a few evaluations."""
+        fitted = refit(trial.problem, trial.fitted.damper)
+        return _Trial(trial.problem, fitted, self.validation.error_to_first_order(trial.problem, fitted))
+
     def _exchanges(self, current: CriterionFit) -> list[_Trial]:
         """Return what another effect gives in the place of an adopted one, and two in the place of the best such."""
         trials: list[_Trial] = []
@@ -151,7 +167,9 @@ class PredictiveSearch:
                 current.fitted.damper.without_effects(name), self.validation.no_samples
             )
             if found is not None:
-                trials += self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
+                tried = self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
+                tried.sort(key=lambda each: each.estimate)
+                trials += [*map(self._searched_on, tried[:1]), *tried[1:]]
         if not trials:
             return []
         best = min(trials, key=lambda each: each.estimate)
