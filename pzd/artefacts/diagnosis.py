@@ -139,6 +139,24 @@ class NextTest(Frozen):
     """The tested voltages between which the force is known least; None where there are rivals to tell apart."""
 
 
+class Support(Frozen):
+    """How far held-out tests support one adopted effect, whatever the verdict on the whole."""
+
+    share: float = Field(ge=0.0, le=1.0)
+    """Of the baseline's sum of squared errors, what comes back without it, the others refitted."""
+    folds_better: int = Field(ge=0)
+    """Folds whose tests are predicted better with it, each by fits without them."""
+    folds: int = Field(ge=0)
+    """Folds that hold out whole tests."""
+    replaced_by: str | None
+    """Another effect that predicts as well in its place; None where none does."""
+    confidence: float | None = Field(ge=0.0, le=1.0)
+    """Probability that other tests are predicted better with it, halved where another would do as well; None without
+    two tests that are held out as a whole."""
+    sure: Literal["certain", "likely", "open"]
+    """The same in a word."""
+
+
 class Diagnosis(Frozen):
     """What is missing from the model, how sure that is, and what would settle it."""
 
@@ -155,6 +173,10 @@ class Diagnosis(Frozen):
     next_test: NextTest | None
     prediction: Prediction | None = None
     """What decides whether an effect is adopted; None where no test could be held out; `reason` says why."""
+    support: dict[str, Support] = Field(default_factory=dict)
+    """By adopted effect."""
+    left_of_peak: float | None = None
+    """R.m.s. of what the adopted damper leaves above the noise, as a share of peak; None where nothing was tried."""
     zero_m: float = 0.0
     """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 

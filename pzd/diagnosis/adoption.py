@@ -8,8 +8,8 @@ gas does for a parallel spring; the earlier one then goes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class Adoption:
     """Whether the final fit is by criterion (4): what is left is then no noise to weigh by."""
     added: tuple[str, ...] = ()
     """Effects that were added for their prediction alone, in words."""
+    alternatives: Mapping[str, str] = field(default_factory=dict)
+    """Effects that would predict as well in the place of an adopted one, by its name."""
 
     def prediction(self, validation: CrossValidation) -> Prediction | None:
         """Return the prediction figures of diagnosis.json; None where no test could be held out."""
@@ -234,7 +236,7 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
     search = PredictiveSearch(validation, config, len(selection.adopted) + config.most_added)
     final = search.improve(before)
     if final is before:
-        return adoption
+        return replace(adoption, alternatives=search.alternatives)
     had, has = (effect_names(each.fitted.damper) for each in (before, final))
     new = {name: ADDED for name in final.fitted.effects if name not in selection.adopted}
     gone = dict.fromkeys({*selection.adopted} - {*final.fitted.effects}, REPLACED)
@@ -245,4 +247,5 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
         reasons={**selection.reasons, **new, **gone},
     )
     errors = adoption.baseline_error, final.error, final.interpolation_error
-    return Adoption(extended, *errors, by_criterion=True, added=tuple(name for name in has if name not in had))
+    added = tuple(name for name in has if name not in had)
+    return Adoption(extended, *errors, by_criterion=True, added=added, alternatives=search.alternatives)

@@ -186,9 +186,25 @@ def predicts_better(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts better than another: visibly, and by two standard errors.
 
     Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
-    verdict, and nothing speaks against it.
+    verdict, and nothing speaks against it. The differences may be those of the logarithms too: an effect that shows
+    much in one test and little in another, and takes the same share of either error, is no chance.
     """
-    return _error_is_larger(other, one, thresholds.PREDICTION_STANDARD_ERRORS)
+    if _error_is_larger(other, one, thresholds.PREDICTION_STANDARD_ERRORS):
+        return True
+    return one.visibly_below(other) and ratio_in_standard_errors(one, other) > thresholds.PREDICTION_STANDARD_ERRORS
+
+
+def ratio_in_standard_errors(one: PredictionError, other: PredictionError) -> float:
+    """Compute by how many standard errors the errors of another damper are larger, as a ratio; 0 of a single test.
+
+    Equation: t = mean d / (s_d / sqrt(n)), d_i = ln W_s,i of the other one - ln W_s,i  Source: Student 1908, paired
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.log(other.error / one.error)
+    if ratio.size < FEWEST_DIFFERENCES or not np.isfinite(ratio).all():
+        return 0.0
+    deviation, mean = standard_error(ratio), float(ratio.mean())
+    return mean / deviation if deviation > 0.0 else float(np.sign(mean)) * np.inf if mean else 0.0
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
@@ -228,6 +244,10 @@ REFIT_EVALUATIONS = 6
 """Evaluations of a refit without one fold.
 
 Reason: it begins at the optimum of all tests, which a fifth of them moves little."""
+SMALLEST_SINGULAR = 1e-10
+"""Singular value of a fold's normal equations, scaled to a unit diagonal, below which it shows no direction.
+
+Reason: far above rounding, far below what tests determine."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """Gives the damper refitted to all but the held-out samples; None where nothing is left."""
@@ -285,10 +305,11 @@ class CrossValidation(Folds):
         problem = self._criterion_problem(damper)(held_out)
         return None if problem is None else (problem, refit(problem, damper))
 
-    def error_to_first_order(self, problem: Problem, fitted: FitResult) -> float:
-        """Estimate the held-out W_s of an optimum by criterion (4) without a refit, to rank dampers by.
+    def error_to_first_order(self, problem: Problem, fitted: FitResult) -> PredictionError:
+        """Estimate the held-out prediction error of an optimum by criterion (4) without refits, to compare dampers by.
 
-        A test that is alone at its voltage counts as it was fitted: its halves share its harmonics.
+        The noise of single samples is left out: tests that repeat count as their average cycles. A test that is alone
+        at its voltage counts as it was fitted: its halves share its harmonics.
 
         Equation: r_f + J_f (A - J_f' J_f)^-1 J_f' r_f, A = J' J + P' P, f the tests of a fold, P the prior
                                                         Source: Allen 1974, Technometrics 16, 125-127, by groups
@@ -303,28 +324,32 @@ class CrossValidation(Folds):
         normal = sum((each.T @ each for each in slopes), fitted.prior.T @ fitted.prior)
         size = np.sqrt(np.maximum(np.diag(normal), np.finfo(np.float64).tiny))
         squares = np.array([r @ r for r in fitted.residuals])
-        for members in self._folds_of(problem):
+        number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
+        records = [number[o.name] for o in problem.observations]
+        for tests in self.held_out_tests():
+            members = [i for i, record in enumerate(records) if record in tests]
+            if not members:
+                continue
             held, left = (np.concatenate([of[i] for i in members]) for of in (slopes, fitted.residuals))
             rest = (normal - held.T @ held) / np.outer(size, size)
-            step = np.linalg.lstsq(rest, held.T @ left / size, rcond=1e-10)[0] / size
+            step = np.linalg.lstsq(rest, held.T @ left / size, rcond=SMALLEST_SINGULAR)[0] / size
             for i in members:
                 squares[i] = float(np.sum((fitted.residuals[i] + slopes[i] @ step) ** 2))
-        samples = {p.record.name: p.record.time.size for p in self.campaign.prepared}
-        error = energy = 0.0
-        for o, force, before, after in zip(
-            problem.observations, fitted.simulated, fitted.residuals, squares, strict=True
+        entries = []
+        for record, o, force, seen, square in zip(
+            records, problem.observations, fitted.simulated, fitted.residuals, squares, strict=True
         ):
-            count, grown = samples[o.name], after / max(float(before @ before), np.finfo(np.float64).tiny)
-            error += count * grown * float(np.mean((o.measured - force) ** 2))
-            energy += count * float(np.mean(o.measured**2))
-        return error / energy
+            grown = square / max(float(seen @ seen), np.finfo(np.float64).tiny)
+            error, energy, spread = squared_sums(o.measured, o.measured - force)
+            negligible = o.measured.size * (self.visible * o.peak) ** 2
+            count = self.campaign.prepared[record].record.time.size / o.measured.size
+            entries.append(tuple(count * each for each in (grown * error, energy, spread, negligible)))
+        return PredictionError.of_entries(records, entries)
 
-    def _folds_of(self, problem: Problem) -> list[list[int]]:
-        """Return the observations of whole tests that each fold holds out."""
-        number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
-        whole = [(i, number[o.name]) for i, o in enumerate(problem.observations)]
-        folds = [[i for i, record in whole if fold[record].all()] for fold in self.folds]
-        return [members for members in folds if members]
+    def held_out_tests(self) -> list[frozenset[int]]:
+        """Return the records that each fold holds out as a whole."""
+        found = [frozenset(i for i, mask in enumerate(fold) if mask.all()) for fold in self.folds]
+        return [tests for tests in found if tests]
 
     def worse_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
         """Return the voltages [V] at which one damper predicts worse; all where only the whole shows it.

@@ -56,6 +56,10 @@ class _Trial:
     estimate: float
     """W_s of held-out tests, see `CrossValidation.error_to_first_order`."""
 
+    @classmethod
+    def of(cls, problem: Problem, fitted: FitResult, validation: CrossValidation) -> _Trial:
+        return cls(problem, fitted, validation.error_to_first_order(problem, fitted).criterion or 0.0)
+
 
 @dataclass(eq=False)
 class PredictiveSearch:
@@ -69,6 +73,8 @@ class PredictiveSearch:
     """Values in the units of the search that the last fit of an effect reached: where the next one starts."""
     off: set[str] = field(default_factory=set)
     """Effects that were off beside an added one: they are not tried again."""
+    alternatives: dict[str, str] = field(default_factory=dict)
+    """What would predict as well in the place of an effect of the damper that the search ended with."""
     bent: set[str] = field(default_factory=set)
     """Effects that go wrong between voltages beside those of the current damper: not tried before it is another."""
 
@@ -98,7 +104,7 @@ class PredictiveSearch:
 
     def _best(self, current: CriterionFit, tried: Sequence[_Trial]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
-        here = self.validation.error_to_first_order(current.problem, current.fitted)
+        here = _Trial.of(current.problem, current.fitted, self.validation).estimate
         promising = sorted((each for each in tried if each.estimate < here), key=lambda each: each.estimate)
         better = []
         for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
@@ -148,19 +154,19 @@ class PredictiveSearch:
                 continue
             own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
             if each.effect not in undetermined(own, each.fitted):
-                estimate = self.validation.error_to_first_order(own, each.fitted)
-                trials.append(_Trial(own, each.fitted, estimate))
+                trials.append(_Trial.of(own, each.fitted, self.validation))
         return trials
 
     def _searched_on(self, trial: _Trial) -> _Trial:
         """Return a trial at its optimum: candidates are fitted in a few evaluations."""
-        fitted = refit(trial.problem, trial.fitted.damper)
-        return _Trial(trial.problem, fitted, self.validation.error_to_first_order(trial.problem, fitted))
+        return _Trial.of(trial.problem, refit(trial.problem, trial.fitted.damper), self.validation)
 
     def _exchanges(self, current: CriterionFit) -> list[_Trial]:
         """Return what another effect gives in the place of an adopted one, and two in the place of the best such."""
         trials: list[_Trial] = []
-        for name in current.fitted.effects if len(current.fitted.effects) > 1 else ():
+        here = _Trial.of(current.problem, current.fitted, self.validation).estimate
+        self.alternatives.clear()
+        for name in current.fitted.effects:
             if name in self.config.force:
                 continue
             found = self.validation.fit_by_criterion(
@@ -169,7 +175,10 @@ class PredictiveSearch:
             if found is not None:
                 tried = self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
                 tried.sort(key=lambda each: each.estimate)
-                trials += [*map(self._searched_on, tried[:1]), *tried[1:]]
+                tried[:1] = map(self._searched_on, tried[:1])
+                trials += tried
+                if tried and tried[0].estimate < (1.0 + thresholds.LEAST_PREDICTION_GAIN) * here:
+                    self.alternatives[name] = tried[0].fitted.effects[-1]
         if not trials:
             return []
         best = min(trials, key=lambda each: each.estimate)

@@ -169,6 +169,11 @@ INTERPOLATION_DEPARTURE = 0.25
 Reason: a force that goes with the square of the voltage lies off by just that; with parameters on lines, and an effect
 that the tests know at each voltage, it is a few hundredths. Not tuned."""
 
+CERTAIN_FROM = 0.99
+"""Probability from which an adopted effect is called certain; below `DOUBTFUL_BELOW` it is called open.
+
+Reason: one such effect in a hundred predicts other tests no better, if the tests are like them; not tuned."""
+
 # --- Trends of the nuisances over the tests (verdict.py)
 
 FEWEST_FOR_A_TREND = 3

@@ -31,11 +31,12 @@ from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
-from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions
+from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.forward_selection import select_effects
+from pzd.diagnosis.support import support_of
 from pzd.diagnosis.verdict import (
     Decision,
     Verdict,
@@ -100,6 +101,8 @@ def diagnose_setting(
         parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=final.zero_m,
+        support=support_of(adoption, validation),
+        left_of_peak=visible_gap(campaign.checks(selection.fitted.damper)),
         ranking=ranking_of(selection, selection.initial_evidence),
         rivals=(*selection.rivals, *decision.possible),
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),

@@ -53,7 +53,7 @@ def diagnosis_lines(
     """
     unit = control.unit
     lines = [
-        f"verdict: {diagnosis.verdict}, {_VERDICTS[diagnosis.verdict]}",
+        f"verdict: {diagnosis.verdict}, {headline(diagnosis)}",
         f"reason: {diagnosis.reason}",
         _gap(diagnosis),
     ]
@@ -69,6 +69,18 @@ def diagnosis_lines(
     if diagnosis.next_test:
         lines.append(next_test_line(diagnosis.next_test, unit))
     return lines
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict in words: what is known of the parts first where the whole is unexplained."""
+    known = [
+        f"{name.replace('_', ' ')} is {each.sure} ({each.share:.0%} of the gap comes back without it)"
+        for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
+        if each.sure != "open"
+    ]
+    if diagnosis.verdict != "unexplained" or not known or diagnosis.left_of_peak is None:
+        return _VERDICTS[diagnosis.verdict]
+    return f"but {', '.join(known)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
 
 
 def _open_names(diagnosis: Diagnosis) -> str:

@@ -301,6 +301,25 @@ def test_an_added_effect_replaces_what_stood_in_for_it(rng: np.random.Generator)
     assert {"preload_offset", "gas_spring"} <= set(asked.selection.fitted.damper.effects)
 
 
+@pytest.mark.parametrize("first", ["rounded_yield", "orifice_quadratic"])
+def test_a_wrong_first_effect_is_exchanged_for_the_true_one(first: str, rng: np.random.Generator) -> None:
+    """Where the search began decides nothing: with no room for one more, the true law takes the place of another."""
+    truth = damper_of(TWO, shear_thinning={"n": 0.4})
+    records = records_of(truth, rng)
+    config = DiagnoseConfig(most_added=0, forbid=all_but("rounded_yield", "orifice_quadratic", "shear_thinning"))
+    selection, validation = plain_selection(records, config)
+    whole, start = selection.initial_evidence.whole, {"rounded_yield": {"w_s": 0.01}, "orifice_quadratic": {"q": 500.0}}
+    fitted = fit(whole, (first,), whole.start_with(damper_of(TWO, **{first: start[first]})))
+    missed = validation.error_by_criterion(fitted.damper)
+    between = validation.interpolation_error(fitted.damper, by_criterion=True)
+    adopted = replace(selection, fitted=fitted, reasons={first: "adopted"})
+    found = add_predictive_effects(Adoption(adopted, missed, missed, between), validation, config)
+    assert found.added == ("shear_thinning",)
+    assert set(found.selection.fitted.damper.effects) == {"shear_thinning"}
+    assert found.selection.fitted.damper.effects["shear_thinning"]["n"] == pytest.approx(0.4, rel=0.05)
+    assert found.selection.reasons[first] == REPLACED
+
+
 def test_a_delay_of_the_force_channel_is_added_with_its_value(rng: np.random.Generator) -> None:
     """Left out, its hysteresis is taken up by whatever effect of the damper comes next to it."""
     forbid = all_but("sensor_delay", "fluid_inertia", "gas_spring")
