@@ -196,7 +196,7 @@ def test_every_sample_of_every_voltage_is_held_out_once(rng: np.random.Generator
 def test_to_first_order_each_test_is_predicted_as_by_a_refit_without_its_fold(rng: np.random.Generator) -> None:
     """Springs and offsets are linear, and a fold moves T0, C and k of the element by little."""
     truth = damper_of((0.0,), gas_spring={"k_g": 4000.0}, preload_offset={"F_0": 60.0})
-    records = sines(truth, rng, (0.0,), tests=[*TESTS, *OTHER_TESTS[1:]], cycles=3, jitter=0.03, noise=1e-3)
+    records = sines(truth, rng, (0.0,), tests=[*TESTS, (1.0, 0.02), (1.0, 0.03)], cycles=3, jitter=0.03, noise=1e-3)
     asked = validation(records, damper_of((0.0,)))
     found = asked.fit_by_criterion(truth, asked.no_samples)
     assert found is not None
@@ -205,7 +205,7 @@ def test_to_first_order_each_test_is_predicted_as_by_a_refit_without_its_fold(rn
         [float(np.sum((o.measured - f) ** 2)) for o, f in zip(found[0].observations, found[1].simulated, strict=True)]
     )
     energy = np.array([float(np.sum(o.measured**2)) for o in found[0].observations])
-    assert quick.criterion == pytest.approx(slow.criterion, rel=0.05)
+    assert quick.criterion == pytest.approx(slow.criterion, rel=0.03)
     assert (quick.criterion or 0.0) > 1.1 * seen.sum() / energy.sum()
     order = [slow.records.index(i) for i in quick.records]
-    assert quick.error / quick.energy == pytest.approx((slow.error / slow.energy)[order], rel=0.15)
+    assert quick.error / quick.energy == pytest.approx((slow.error / slow.energy)[order], rel=0.05)
