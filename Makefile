@@ -79,8 +79,9 @@ changes-study: $(DEV)  ## Print how often `pzd changes` is right, on pairs of vi
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 20 --kind same
 
 .PHONY: planted
-planted: $(DEV)  ## Print what `pzd changes` makes of forces added in software to measured tests; needs the measured data
+planted: $(DEV)  ## Print what `pzd changes` and `pzd diagnose` make of forces added in software to measured tests; needs the measured data
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/planted.py
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/planted.py --diagnose
 
 .PHONY: coverage-study
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes

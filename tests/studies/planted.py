@@ -1,12 +1,15 @@
-"""What `pzd changes` makes of one force that was added in software to measured tests.
+"""What `pzd changes` and `pzd diagnose` make of one force that was added in software to measured tests.
 
-    PYTHONPATH=. python tests/studies/planted.py [--share 0.03] [CONFIG ...]
+    PYTHONPATH=. python tests/studies/planted.py [--share 0.03] [--diagnose] [--only EFFECT] [CONFIG ...]
 
 By default on the dampers of configs/utfsm.yaml and configs/utfpr.yaml, read from the folder of the measured data. The
 second, fourth, ... cycle of every test, with the force added, is the state after; the first, third, ... without it the
 state before, so that no noise is shared. `--share` is the largest added force as a share of peak. A line a plant: the
 verdict, the names with their share, and the size that was found over the one that was planted. `load_cell_zero` counts
 for a preload.
+
+With `--diagnose` the force is added to every test as it was recorded, and the tests are diagnosed alone: an effect is found
+where it is adopted, and its size less that in the tests as they are lies within 15 % of what was planted.
 """
 
 from __future__ import annotations
@@ -20,12 +23,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pzd.artefacts import Rig
+from pzd.artefacts import Diagnosis, Rig
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.changes.comparison import changes_between
 from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.stage import diagnose
 from pzd.identification.stage import identify
 from pzd.pipeline.command import Opened, execute, opened
 from pzd.record import Record, mid_stroke
@@ -118,18 +122,64 @@ def study(given: Opened, share: float) -> None:
         sys.stdout.flush()
 
 
+WITHIN = 0.15
+"""Share of a planted size within which the size found is right."""
+
+
+def diagnose_study(given: Opened, share: float, only: Sequence[str]) -> None:
+    """Print for each plant whether `pzd diagnose` adopts it in the tests of a config, and with which size."""
+    config, control = given.config, given.run.control
+    execute(given, "ingest", force=False, jobs=1, say=lambda _: None)
+    records = [r for r in given.run.read(Rig).records if config.setting in (None, r.setting)]
+
+    def adopted(tests: Sequence[Record]) -> tuple[Damper, Diagnosis]:
+        rig = Rig(tuple(tests), ())
+        found = diagnose(
+            config.diagnose, config.identify, config.rig, rig, identify(config.identify, rig, 1), control,
+            config.setting, 1,
+        )  # fmt: skip
+        return found.damper, found.diagnosis
+
+    before, found = adopted(records)
+    right, wanted = 0, {name: values for name, values in plants(records, share).items() if not only or name in only}
+    told(given, "nothing", found)
+    for name, values in wanted.items():
+        damper, found = adopted(planted(records, name, values))
+        parameter, size = next(iter(values.items()))
+        own, had = (float(np.mean(d.effects.get(name, {}).get(parameter, 0.0))) for d in (damper, before))
+        ratio = (own - had) / size
+        hit = name in found.effects and abs(ratio - 1.0) <= WITHIN
+        right += hit
+        told(given, f"{name}, {'found' if hit else 'NOT FOUND'}, {ratio:.3f} of what was planted", found)
+    sys.stdout.write(f"{given.run.config.stem}: {right} of {len(wanted)} found\n")
+
+
+def told(given: Opened, plant: str, found: Diagnosis) -> None:
+    """Print what a diagnosis adopts, and what it predicts."""
+    criterion = "-" if found.prediction is None else f"{found.prediction.W_s:.4g}"
+    names = ", ".join(found.effects) or "nothing"
+    sys.stdout.write(f"{given.run.config.stem} {plant}: {found.verdict}, {names}; W_s of kept-back tests {criterion}\n")
+    sys.stdout.flush()
+
+
 def main() -> int:
     """Run the study on every config."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("configs", nargs="*", default=CONFIGS)
     parser.add_argument("--share", type=float, default=0.03)
+    parser.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--only", action="append", default=[])
     arguments = parser.parse_args()
     shared = Path(os.environ.get("PZD_SHARED", "../shared")).resolve()
     with tempfile.TemporaryDirectory() as folder:
         for config in map(Path, arguments.configs):
             text = config.read_text(encoding="utf-8").replace("../../shared", shared.as_posix())
             (Path(folder) / config.name).write_text(text, encoding="utf-8")
-            study(opened(Path(folder) / config.name, Path(folder) / "runs"), arguments.share)
+            given = opened(Path(folder) / config.name, Path(folder) / "runs")
+            if arguments.diagnose:
+                diagnose_study(given, arguments.share, arguments.only)
+            else:
+                study(given, arguments.share)
     return 0
 
 
