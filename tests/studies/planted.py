@@ -8,8 +8,8 @@ state before, so that no noise is shared. `--share` is the largest added force a
 verdict, the names with their share, and the size that was found over the one that was planted. `load_cell_zero` counts
 for a preload.
 
-With `--diagnose` the force is added to every test as it was recorded, and the tests are diagnosed alone: an effect is found
-where it is adopted, and its size less that in the tests as they are lies within 15 % of what was planted.
+With `--diagnose` the force is added to every test as it was recorded, and the tests are diagnosed alone: an effect is
+found where it is adopted, and its size less that in the tests as they are lies within 15 % of what was planted.
 """
 
 from __future__ import annotations
