@@ -11,7 +11,7 @@ passes `interpolation_check`. What is off, or that the prediction does not need,
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -28,7 +28,7 @@ from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
-from pzd.diagnosis.search.determination import showing, undetermined
+from pzd.diagnosis.search.determination import MAY_BE_OFF, showing, undetermined
 from pzd.record import Array
 from pzd.signals.measures import rms
 
@@ -96,11 +96,13 @@ class PredictiveSearch:
         """Yield what a step may go to: one effect more, two more, another in the place of one; each if asked for."""
         added = self._additions(current.problem, current.fitted)
         yield added
+        budget = self.validation.campaign.budget
         sound = [each for each in added if self.bent.isdisjoint(each.fitted.effects)]
-        if sound:
+        if sound and budget.allows_more():
             first = min(sound, key=lambda each: each.estimate)
             yield self._additions(first.problem, first.fitted)
-        yield self._exchanges(current)
+        if budget.allows_more():
+            yield self._exchanges(current)
 
     def _best(self, current: CriterionFit, tried: Sequence[_Trial]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
@@ -111,7 +113,7 @@ class PredictiveSearch:
             error = self.validation.error_by_criterion(each.fitted.damper)
             if improves(error, current.error, self.validation):
                 better.append((each, error))
-        for each, error in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
+        for each, error in sorted(better, key=_fewest_parameters_of_alike(better)):
             between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
             found = self.validation.fit_by_criterion(each.fitted.damper, self.validation.no_samples)
             bends = current.interpolation_error.visibly_below(between)
@@ -147,13 +149,17 @@ class PredictiveSearch:
         return found
 
     def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Trial]:
-        """Return the candidates that move the force visibly, with values that nature has and the tests determine."""
+        """Return the candidates that move the force visibly, with values that nature has and the tests determine.
+
+        Whether one may be off is for the prediction to say: where two of its parameters go together, as the length of a
+        pocket and its pressure do, the interval of either holds zero though both together are there.
+        """
         trials = []
         for each in found:
             if each.explained < self.config.visible or against_nature(each.fitted.damper):
                 continue
             own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
-            if each.effect not in undetermined(own, each.fitted):
+            if undetermined(own, each.fitted).get(each.effect, MAY_BE_OFF) == MAY_BE_OFF:
                 trials.append(_Trial.of(own, each.fitted, self.validation))
         return trials
 
@@ -185,6 +191,20 @@ class PredictiveSearch:
         gone = tuple({*current.fitted.effects} - {*best.fitted.effects})
         two = self._further(best.problem, best.fitted, thresholds.EXCHANGED_EFFECTS, gone)
         return trials + self._possible(best.problem, two)
+
+
+def _fewest_parameters_of_alike(
+    better: Sequence[tuple[_Trial, PredictionError]],
+) -> Callable[[tuple[_Trial, PredictionError]], tuple[float, float]]:
+    """Return the order of trials: the best, and those that predict alike, by their parameters, then the others."""
+    least = min((error.criterion or 0.0 for _, error in better), default=0.0)
+
+    def order(pair: tuple[_Trial, PredictionError]) -> tuple[float, float]:
+        trial, criterion = pair[0], pair[1].criterion or 0.0
+        alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * criterion <= least
+        return (float(trial.fitted.optimum.size) if alike else np.inf), criterion
+
+    return order
 
 
 def _names(found: CriterionFit) -> str:
@@ -226,19 +246,25 @@ def without_replaced(current: CriterionFit, validation: CrossValidation, forced:
 
 
 def without_off(current: CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> CriterionFit:
-    """Remove effects that may as well be off beside what was added, whatever they predict; the rest is refitted.
+    """Remove effects that may as well be off beside what was added, unless the prediction needs them; refit the rest.
 
-    Within the tests such an effect does little either way; beyond them, as a stop at the end of the stroke, anything.
+    What begins at some displacement goes whatever it predicts: within the tests it does little either way; beyond them,
+    as a stop at the end of the stroke, anything.
     """
+    needed = set[str]()
     while True:
-        shown = showing(current.fitted)
-        off = next((name for name in current.fitted.effects if name not in shown and name not in forced), None)
+        shown = {*showing(current.fitted), *forced, *needed}
+        off = next((name for name in current.fitted.effects if name not in shown), None)
         damper = current.fitted.damper.without_effects(off or "")
         found = validation.fit_by_criterion(damper, validation.no_samples) if off else None
-        if found is None:
+        if off is None or found is None:
             return current
+        error = validation.error_by_criterion(damper)
+        if not library()[off].needs_displacement_zero and improves(current.error, error, validation):
+            needed.add(off)
+            continue
         between = validation.interpolation_error(found[1].damper, by_criterion=True)
-        current = CriterionFit(*found, validation.error_by_criterion(damper), between)
+        current = CriterionFit(*found, error, between)
 
 
 def _removable(fitted: FitResult) -> list[str]:
