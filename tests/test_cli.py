@@ -20,6 +20,7 @@ import yaml
 from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, HeldOutTest, HeldOutVoltage, Prediction, Ranked, Region, Value
+from pzd.artefacts.diagnosis import Support
 from pzd.cli.app import status
 from pzd.cli.output import Output, complain
 from pzd.config import load
@@ -774,6 +775,24 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
             " to tell orifice_quadratic from shear_thinning"
         ),
     ]
+
+
+def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
+    """The effect that closes most comes first; one that is open is not listed."""
+    shares = {"gas_spring": (0.09, "likely"), "rounded_yield": (0.61, "certain"), "lash": (0.3, "open")}
+    support = {
+        name: Support.model_validate(
+            {"share": share, "folds_better": 5, "folds": 5, "replaced_by": None, "confidence": 0.95, "sure": sure}
+        )
+        for name, (share, sure) in shares.items()
+    }
+    known = diagnosis().model_copy(update={"verdict": "unexplained", "support": support, "left_of_peak": 0.0612})
+    assert diagnosis_lines(known, Control())[0] == (
+        "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), gas spring is likely"
+        " (9% of the gap comes back without it); 6.1 % of peak has no name"
+    )
+    bare = known.model_copy(update={"support": {}})
+    assert diagnosis_lines(bare, Control())[0].startswith("verdict: unexplained, a gap that repeats")
 
 
 def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
