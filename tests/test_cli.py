@@ -788,8 +788,8 @@ def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
     }
     known = diagnosis().model_copy(update={"verdict": "unexplained", "support": support, "left_of_peak": 0.0612})
     assert diagnosis_lines(known, Control())[0] == (
-        "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), gas spring is likely"
-        " (9% of the gap comes back without it); 6.1 % of peak has no name"
+        "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), "
+        "gas spring is likely (9% of the gap comes back without it); 6.1 % of peak has no name"
     )
     bare = known.model_copy(update={"support": {}})
     assert diagnosis_lines(bare, Control())[0].startswith("verdict: unexplained, a gap that repeats")
