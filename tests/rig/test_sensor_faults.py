@@ -17,7 +17,7 @@ from pzd.identification.stage import identify
 from pzd.record import Array, Record, conditions, distinct
 from pzd.rig.config import Limits
 from pzd.rig.preflight import Check, PreflightRecord, findings
-from pzd.rig.preflight.amplifier import amplifier, drop_contradicting_filters
+from pzd.rig.preflight.amplifier import amplifier, drop_contradicting_filters, drop_contradicting_ranges
 from pzd.rig.preflight.force import delay
 from pzd.rig.preflight.sensors import drift, dropouts, gain_step, held_channel, quantisation
 from pzd.signals.cycles import cycles
@@ -271,30 +271,38 @@ def test_a_force_that_saturates_below_the_noise_is_told_with_what_is_missing(
     assert np.mean([cut == hard for _, cut in missing]) >= 0.8
 
 
-def test_low_passes_that_differ_from_record_to_record_or_are_rare_are_a_law_that_is_missing() -> None:
-    def entries(*corners: float | None) -> tuple[RecordEntry, ...]:
-        return tuple(
-            RecordEntry(
-                name=str(n),
-                setting=None,
-                voltage_V=None,
-                temperature_degC=None,
-                rate_Hz=500.0,
-                cycles=8.0,
-                findings=()
-                if corner is None
-                else (Finding(check="filter", where="force", size=corner, unit="Hz", follows=""),),
-            )
-            for n, corner in enumerate(corners)
-        )
+def entry(name: str, size: float | None, check: str, force: float = 100.0) -> RecordEntry:
+    """The entry of a record with one finding, or none."""
+    told = () if size is None else (Finding(check=check, where="force", size=size, unit="Hz", follows=""),)
+    return RecordEntry(
+        name=name,
+        setting=None,
+        voltage_V=None,
+        temperature_degC=None,
+        rate_Hz=500.0,
+        cycles=8.0,
+        force_rms_N=force,
+        findings=told,
+    )
 
-    def left(*corners: float | None) -> int:
-        return sum(len(entry.findings) for entry in drop_contradicting_filters(entries(*corners)))
 
-    assert left(10.0, 11.0, 12.0) == 3
-    assert left(10.0, None, 11.0) == 2
-    assert left(10.0, 30.0, 11.0) == 0
-    assert left(10.0, None, None, None) == 0
+@pytest.mark.parametrize(
+    ("corners", "left"),
+    [((10.0, 11.0, 12.0), 3), ((10.0, None, 11.0), 2), ((10.0, 30.0, 11.0), 0), ((10.0, None, None, None), 0)],
+)
+def test_low_passes_that_differ_from_record_to_record_or_are_rare_are_a_law_that_is_missing(
+    corners: tuple[float | None, ...], left: int
+) -> None:
+    entries = tuple(entry(str(n), corner, "filter") for n, corner in enumerate(corners))
+    assert sum(len(one.findings) for one in drop_contradicting_filters(entries)) == left
+
+
+@pytest.mark.parametrize(("largest", "left"), [(None, 1), (30.0, 2)])
+def test_a_range_that_a_larger_force_goes_beyond_is_the_damper_giving_way(largest: float | None, left: int) -> None:
+    entries = (entry("slow", None, "range", 50.0), entry("a", 30.0, "range", 100.0), entry("b", largest, "range", 90.0))
+    assert sum(len(one.findings) for one in drop_contradicting_ranges(entries)) == left
+    beyond = (*entries, entry("c", None, "range", 200.0))
+    assert sum(len(one.findings) for one in drop_contradicting_ranges(beyond)) == 0
 
 
 def test_a_velocity_at_odds_with_the_displacement_is_left_out_of_everything(

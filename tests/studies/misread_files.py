@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
+from scipy.signal import butter, lfilter, lfilter_zi
 
 from pzd.quantities import Control
 from pzd.record import Array
@@ -33,6 +34,7 @@ X = 0.01 * np.sin(2.0 * np.pi * 2.0 * TIME)
 V = 0.01 * 2.0 * np.pi * 2.0 * np.cos(2.0 * np.pi * 2.0 * TIME)
 RNG = np.random.default_rng(1)
 FORCE = 900.0 * V + 200.0 * np.tanh(V / 0.005) + 1.0 * RNG.standard_normal(TIME.size)
+NOISE = np.random.default_rng(2).standard_normal(TIME.size)
 VOLTS = np.full(TIME.size, 100.0)
 BASE: dict[str, Any] = {"time_s": TIME, "displacement_m": X, "force_N": FORCE, "voltage_V": VOLTS}
 
@@ -112,6 +114,12 @@ def days(form: str) -> list[str]:
     """Dates and times over the midnight from 1 to 2 February."""
     start = datetime(2024, 2, 1, 23, 59, 58)  # noqa: DTZ001  # a logger knows no zone
     return [(start + timedelta(seconds=t)).strftime(f"{form} %H:%M:%S.%f") for t in TIME.tolist()]
+
+
+def behind(low_pass: float, values: Array, order: int = 1) -> Array:
+    """A channel behind a low-pass with this corner [Hz]."""
+    b, a = butter(order, low_pass, fs=1000.0)
+    return np.asarray(lfilter(b, a, values, zi=lfilter_zi(b, a) * values[0])[0])
 
 
 def zeroed(count: int, length: int) -> Array:
@@ -339,6 +347,21 @@ WAYS: tuple[Way, ...] = (
         Way(f"force {1e3 * late:g} ms late", other(force_N=np.interp(TIME - late, TIME, FORCE)), true={"force": None})
         for late in (0.02, 0.05, 0.1)
     ),
+    *(
+        Way(f"force behind a low-pass of 10 Hz, order {n}", other(force_N=behind(10.0, FORCE, n)), true={"force": None})
+        for n in (1, 2)
+    ),
+    Way(
+        "force behind a low-pass of 10 Hz, displacement behind one of 60 Hz",
+        other(force_N=behind(10.0, FORCE), displacement_m=behind(60.0, X)),
+        true={"force": None},
+    ),
+    Way(
+        "a soft amplifier of a force that is mostly viscous, before the noise",
+        other(force_N=400.0 * np.tanh((4000.0 * V + 100.0 * np.sign(V)) / 400.0) + NOISE),
+        true={"force": None},
+    ),
+    Way("force cut off before the noise", other(force_N=np.clip(FORCE, -250.0, 250.0) + NOISE), true={"force": None}),
     Way(
         "a voltage that drops to 0 V in 2 % of the rows",
         other(voltage_V=np.where(RNG.random(TIME.size) < 0.02, 0.0, VOLTS)),

@@ -171,5 +171,17 @@ def _cut(section: Section, share: float) -> tuple[float, float]:
     return (fit.residual * between.squares + flat) / section.squares, missing
 
 
+def drop_contradicting_ranges(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """Drop the ranges that a record of a larger force does not end at: a damper gives way there, and no amplifier."""
+    free = [e.force_rms_N or 0.0 for e in entries if all(f.check != "range" for f in e.findings)]
+    return tuple(
+        entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "range")})
+        if (entry.force_rms_N or 0.0) < max(free, default=0.0)
+        else entry
+        for entry in entries
+    )
+
+
 CHECKS = (amplifier,)
-COMPARISONS = (drop_contradicting_filters,)
+COMPARISONS = (drop_contradicting_filters, drop_contradicting_ranges)
+"""Each looks at its own findings only."""

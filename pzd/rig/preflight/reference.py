@@ -19,6 +19,7 @@ from pzd.record import Array
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.cycles import Cycles
 from pzd.signals.kinematics import mean_over_period
+from pzd.signals.measures import despiked
 
 MOST_AVERAGES, MOST_SAMPLES = 800, 1200
 """Samples of a section at most, averages of a cycle or those of some cycles: enough for the shape of the loops."""
@@ -150,17 +151,18 @@ def _first_cycles(test: PreflightRecord) -> Section:
     end = record.time[-1] - (0.5 * run.period if run else 0.0)
     count = int(min(length, max(end - start, 0.5 * (record.time[-1] - start))) * record.rate)
     every = -(-count // MOST_SAMPLES)
-    rows = slice(first, first + count, every)
-    time, x = record.time[rows], test.clean.displacement[rows]
+    # A steady clock, whatever that of the record; a sample that jumps away is reported as that.
+    time = record.time[first] + np.arange(0, count, every) / record.rate
+    x, force = np.interp(time, record.time, test.clean.displacement), despiked(record.force)
     shown = np.arange(x.size) >= int(FADED * x.size)
-    turns = np.flatnonzero(np.diff(np.sign(test.clean.velocity[rows])) != 0.0)
+    turns = np.flatnonzero(np.diff(np.sign(np.interp(time, record.time, test.clean.velocity))) != 0.0)
     for beside in BESIDE_REVERSAL:
         shown[np.clip(turns + beside, 0, x.size - 1)] = False
     if np.count_nonzero(shown) < 0.25 * x.size:  # too few samples a cycle to leave some out
         shown = np.arange(x.size) >= int(FADED * x.size)
 
     def delayed(delays: Array) -> Array:
-        return np.stack([np.interp(time + delay, record.time, record.force) for delay in delays])
+        return np.stack([np.interp(time + delay, record.time, force) for delay in delays])
 
     return Section(every / record.rate, x, delayed, shown)
 
