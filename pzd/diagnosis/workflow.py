@@ -173,7 +173,8 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
                 parameters=values,
                 reason="rival" if c.effect in selection.rivals else reason,
             )
-    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, r.delta_bic)))
+    # Candidates that explain nothing tie but for rounding, which differs between machines: there the name decides.
+    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, round(r.delta_bic), r.effect)))
 
 
 def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str, Value]]:
