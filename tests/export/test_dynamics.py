@@ -33,7 +33,12 @@ needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed: apt-ge
 RATE = 2000.0
 QUICK = ("plain", "rounded", "lag", "thinning", "hysteresis", "pocket", "frame")
 """Those for the gate: the element, and the effects that have no closed form."""
-ALL = [name if name in QUICK else pytest.param(name, marks=pytest.mark.ci) for name in EXPORTED]
+AT_LIMITS = ("elasto-plastic", "rigid", "stiff")
+"""Under a constant control signal our own closed form is exact there, while the march, and C with it, is just off the
+limit, and a sample on the very reversal may show either side of the jump; test_fmu.py has them on inputs that vary."""
+ALL = [
+    name if name in QUICK else pytest.param(name, marks=pytest.mark.ci) for name in EXPORTED if name not in AT_LIMITS
+]
 
 
 def motions(rng: np.random.Generator) -> Mapping[str, Motion]:
