@@ -248,7 +248,7 @@ def a_number_as_key(pick: Pick) -> Broken:
     return key_becomes(text, site, "12")
 
 
-@mistake(r"rig: is missing")
+@mistake(r"say where the damper comes from: rig, or damper")
 def the_needed_block_left_out(pick: Pick) -> Broken:
     pick("alike")
     return Broken("seed: 1\n", 0)

@@ -49,7 +49,6 @@ def stages(config: RunConfig) -> tuple[Stage, ...]:
     from pzd.force_table.mounted import tabulate_mounted
     from pzd.force_table.stage import tabulate
     from pzd.identification.stage import identify
-    from pzd.report.mounted import report_mounted
     from pzd.report.stage import report
     from pzd.rig.stage import ingest, synthesise
     from pzd.simulate.config import SimulateConfig
@@ -57,6 +56,8 @@ def stages(config: RunConfig) -> tuple[Stage, ...]:
 
     not_simulated = {"simulate": SimulateConfig(), "rides": Rides()}
     if config.rig is None:
+        from pzd.report.mounted import report_mounted  # heavy: not for runs of a rig that are fresh
+
         mounted = (Stage("simulate", simulate_mounted), Stage(LAST, report_mounted))
         on_curve = (Stage(LAST, report_mounted, not_simulated),)
         return (Stage("table", tabulate_mounted), *(mounted if config.car else on_curve))

@@ -368,7 +368,7 @@ def test_an_effect_that_interpolates_worse_is_not_added(
     [
         ("gas_spring", {"k_g": -1488.0}),
         ("fluid_inertia", {"m": -3.0}),
-        ("sensor_delay", {"tau": -0.05}),
+        ("sensor_delay", {"tau": -0.09}),
         ("relief_valve", {"F_r": 900.0, "C_r": 4000.0}),
     ],
 )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_uff import written
 from written_files import FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.cli.app import status
@@ -150,6 +151,12 @@ def rpc3(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) 
     path.write_bytes(head.ljust(5 * 512, b"\0") + data)
 
 
+def uff(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) -> None:
+    """Of dataset 58, in text; a function of its own for each channel."""
+    channels = [head for head in columns if head != "time"]
+    written(path, *((head, 0, units[head], columns["time"], columns[head]) for head in channels))
+
+
 WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "excel": ("a.xlsx", excel, NAMED | {"units_row": True}),
     "parquet": ("a.parquet", parquet, NAMED),
@@ -164,6 +171,7 @@ WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
     "mdf": ("a.mf4", mdf, NAMED),
     "mts": ("a.dat", mts, NAMED),
     "rpc3": ("a.rsp", rpc3, NAMED),
+    "uff": ("a.uff", uff, NAMED),
     "lvm": ("a.lvm", lvm, {"columns": NAMED["columns"] | {"time": "X_Value"}}),
 }
 every_format = pytest.mark.parametrize("name", WRITERS)
@@ -180,7 +188,9 @@ def test_every_value_of_a_format_is_read(tmp_path: Path, name: str) -> None:
     rig = run(tmp_path, {"path": file} | entry)
     (record,) = rig.records
     assert record.voltage is not None
-    exact = {"mts": 1e-8, "lvm": 1e-8, "rpc3": 1e-6}.get(name, 1e-15)  # text of nine digits, numbers of 32 bits
+    exact = {"mts": 1e-8, "lvm": 1e-8, "uff": 1e-11, "rpc3": 1e-6}.get(
+        name, 1e-15
+    )  # text of nine digits, numbers of 32 bits
     assert record.time == pytest.approx(TIME, abs=exact)
     assert record.displacement == pytest.approx(X, abs=exact)
     assert record.force == pytest.approx(FORCE, abs=max(exact, 1e-12) * 1e2)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from pzd.artefacts import Finding
 from pzd.damper.element import element_force
@@ -257,6 +257,7 @@ def two_tests(one: Record) -> Record:
 
 
 FAULTS: dict[str, Callable[[Record], Record]] = {
+    "amplifier": lambda one: replace(one, force=lfilter(*butter(2, 6.0, fs=1000.0), one.force)),
     "cycle_count": lambda one: cut(one, 2.2),
     "delay": lambda one: replace(one, force=np.roll(one.force, 12)),
     "drift": lambda one: replace(one, force=one.force + np.linspace(0.0, 0.2, one.time.size) * np.ptp(one.force)),

@@ -35,8 +35,11 @@ def amplifier(test: PreflightRecord) -> Iterator[Finding]:
         return
     found = [_low_pass(section, plain, test.cycles.frequency if test.cycles else 1.0), _saturation(section)]
     left, finding = min(found, key=lambda one: one[0])
-    if finding is not None and left < EXPLAINS * plain.residual:
-        yield finding
+    if finding is None or left >= EXPLAINS * plain.residual:
+        return
+    if finding.check == "filter" and _rounded_yield(section) < max(left, WORTH):
+        return
+    yield finding
 
 
 # --- A low-pass of the force ---
@@ -86,6 +89,29 @@ def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[fl
     )
 
 
+ROUNDINGS = np.geomspace(0.003, 1.0, 16)
+"""Speeds at which a yield is rounded that are tried, as shares of the largest: a quarter off is near enough."""
+
+
+def _rounded_yield(section: Section) -> float:
+    """Return the share of the squares left by a yield that is rounded, as in magneto-rheological dampers.
+
+    A low-pass without delay turns the sign of a reversal into the same curve, where there is one motion alone.
+
+    Equation: F = F_0 + T0 tanh(v / w_s) + C v + c_1 x + c_2 a     Source: least squares
+    """
+    x, force = section.displacement, section.force[section.shown]
+    v = np.gradient(x, section.step)
+    smooth = [np.ones(x.size), x, v, np.gradient(v, section.step)]
+    shares = []
+    for rounding in ROUNDINGS * float(np.abs(v).max()):
+        design = np.stack([*smooth, np.tanh(v / rounding)], axis=1)[section.shown]
+        design /= np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+        rest = force - design @ np.linalg.lstsq(design, force)[0]
+        shares.append(float(rest @ rest) / section.squares)
+    return min(shares)
+
+
 def _behind(section: Section, order: int, corner: float, zooms: int = 1) -> ReferenceFit:
     """Fit the element behind a low-pass."""
     b, a = butter(order, min(2.0 * corner * section.step, 0.9))
@@ -115,6 +141,8 @@ SATURATES_AT = (1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0)
 """Where a soft amplifier saturates, as multiples of the largest force that it shows."""
 CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.35)
 """Shares of the samples, at either end, that may be cut off: of more, friction alone is flat too."""
+LEAST_BETWEEN = 20
+"""Fewest samples between the ends, for the four columns of the reference."""
 LEAST_CUT = 0.03
 """Least share of the force shown that is missing at the peak."""
 
@@ -163,6 +191,8 @@ def _cut(section: Section, share: float) -> tuple[float, float]:
     low, high = np.quantile(force[section.shown], (share, 1.0 - share))
     ends = [section.shown & (force >= high), section.shown & (force <= low)]
     between = replace(section, shown=section.shown & (force < high) & (force > low))
+    if np.count_nonzero(between.shown) < LEAST_BETWEEN:
+        return np.inf, 0.0
     fit = fit_element(between, force[None], 2)
     design = columns(between, fit)
     whole = design @ np.linalg.lstsq(design[between.shown], force[between.shown], rcond=None)[0]
