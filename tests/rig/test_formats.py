@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_uff import written
+from test_uff import written as functions_written
 from written_files import FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.cli.app import status
@@ -154,7 +154,7 @@ def rpc3(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) 
 def uff(path: Path, columns: Columns = COLUMNS, units: dict[str, str] = UNITS) -> None:
     """Of dataset 58, in text; a function of its own for each channel."""
     channels = [head for head in columns if head != "time"]
-    written(path, *((head, 0, units[head], columns["time"], columns[head]) for head in channels))
+    functions_written(path, *((head, 0, units[head], columns["time"], columns[head]) for head in channels))
 
 
 WRITERS: dict[str, tuple[str, Callable[..., None], dict[str, Any]]] = {
