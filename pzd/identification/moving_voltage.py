@@ -85,6 +85,11 @@ def _within(a: float | None, b: float | None, within: float) -> bool:
     return a is not None and b is not None and abs(a - b) <= within
 
 
+def _holds_damping(row: ParameterRow) -> bool:
+    """Whether the interval of C excludes zero: where it does not, C is small in these slow tests alone."""
+    return row.C_Ns_per_m_low95 is None or row.C_Ns_per_m_low95 > 0.0
+
+
 def _fit_band(
     records: list[Record], temperature: float | None, known: list[ConstantRow], config: IdentifyConfig
 ) -> list[ParameterRow]:
@@ -97,7 +102,7 @@ def _fit_band(
     for condition, row in known:
         node = int(np.argmin(np.abs(nodes - (condition.voltage or 0.0))))
         temperatures[node] = condition.temperature
-        if row.T0_N is not None and row.C_Ns_per_m is not None and row.k_N_per_m is not None:
+        if row.T0_N is not None and row.C_Ns_per_m is not None and row.k_N_per_m is not None and _holds_damping(row):
             fixed[node] = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
         else:
             records = [*records, *condition.records]

@@ -73,12 +73,15 @@ def test_rows_rise_with_the_voltage_whichever_was_fitted_first() -> None:
 
 
 @pytest.mark.ci
-def test_a_node_that_its_constant_record_does_not_determine_is_fitted_to_moving_records_too() -> None:
-    slow = sine_test(TABLE_2[0.0], 0.05, 0.002, cycles=2, rate=250, voltage=0.0, name="slow")
-    assert rows_for(slow)[0].C_Ns_per_m is None
+@pytest.mark.parametrize("amplitude", [0.001, 0.002])
+def test_a_node_that_its_constant_record_does_not_determine_is_fitted_to_moving_records_too(amplitude: float) -> None:
+    slow = sine_test(TABLE_2[0.0], 0.05, amplitude, cycles=2, rate=250, voltage=0.0, name="slow")
+    (alone,) = rows_for(slow)
+    assert alone.C_Ns_per_m is None or (alone.C_Ns_per_m_low95, alone.status[:4]) == (0.0, "weak")
     rows = rows_for(slow, moving_test(steps))
     assert [row.voltage_V for row in rows] == pytest.approx([0.0, 150.0], abs=0.1)
     np.testing.assert_allclose(values(rows[0]), TABLE_2[0.0], rtol=2e-3)
+    assert rows[0].status == "ok"
 
 
 def test_the_config_may_choose_the_nodes() -> None:
