@@ -75,7 +75,8 @@ def test_from_raw_files_to_the_report_nothing_speaks_of_a_control(
         viscous = 120.0 + 1800.0 * float(speed)
         assert float(rebound) == pytest.approx(viscous + 90.0, rel=0.02)
         assert float(compression) == pytest.approx(-viscous + 90.0, rel=0.02)
-    assert re.search(r"click1 +(89|9[01])[.\d]* +1[12]\d", said[2])
+    # at 0.131 m/s and more the 90 N may as well be an asymmetry of the damping
+    assert re.search(r"click1 +cannot be told from asymmetry +1[12]\d", said[2])
 
 
 @pytest.mark.parametrize(

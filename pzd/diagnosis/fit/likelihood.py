@@ -320,8 +320,6 @@ MOST_HARMONICS = 80
 
 Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of the
 first, and `RESOLUTION` is no finer."""
-LEAST_CALM = 0.5
-"""Least share of the samples beside no jump by which the error of a model is judged; not tuned."""
 EQUAL_WEIGHT_DEVIATION = 0.05
 """Residual of the element without effects [share of the peak, r.m.s.], by which criterion (4) is set against the wide
 priors of C and k.
@@ -394,9 +392,7 @@ def _from_cycles(
     average = _resampled(simulated.mean(axis=0), points)
     # A cycle on fewer points than it has samples has lost as much of its noise.
     variance = error.sample_variance / len(counted) * points / error.points
-    x = _resampled(p.mean_motion[0], points)
-    calm = np.maximum(jumps(cycle), unresolved_turns(given.damper, x, closed=True)) == 0.0
-    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), variance, calm)
+    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), variance)
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
@@ -417,15 +413,14 @@ def _from_cycles(
     return with_nuisances(bare, given.damper, nuisance)
 
 
-def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float, calm: NDArray[np.bool_]) -> float:
+def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
     """Compute the r.m.s. residual of a model above the noise [N], offset, gain and delay of the test fitted.
 
-    Samples beside a jump are left out, unless there are hardly others: there the residual is chance.
+    Samples beside a jump count: without them a rigid damper is trusted so far that what is missing beside it, as a gas
+    charge as large as its friction, is not found.
     """
-    if np.count_nonzero(calm) < LEAST_CALM * calm.size:
-        calm = np.ones_like(calm)
-    columns = np.column_stack([np.ones(force.size), force, slope])[calm]
-    residual = (measured - force)[calm]
+    columns = np.column_stack([np.ones(force.size), force, slope])
+    residual = measured - force
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
     return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
 
@@ -474,7 +469,7 @@ def _from_samples(
     peak = float(np.max(np.abs(measured)))
     alike = _samples_per_harmonic(record)
     slope = gradient_within_stretches(force[mask], mask)
-    discrepancy = _model_discrepancy(measured, force[mask], slope, noise.variance, calm[mask])
+    discrepancy = _model_discrepancy(measured, force[mask], slope, noise.variance)
     left = alike * (DISCREPANCY * discrepancy) ** 2
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
