@@ -188,6 +188,8 @@ class AverageCycle:
     """(H + 1,) Fourier coefficients [m]."""
     variance: Array
     """(H + 1,) variance |.|^2 of the harmonics by noise and resolution [m^2]."""
+    resolved: int
+    """Number of the first harmonics that hold more than the steps of the channel add: the lines of those are no motion."""
 
     @classmethod
     def of(cls, record: Record, run: Cycles) -> AverageCycle:
@@ -198,19 +200,25 @@ class AverageCycle:
         error = pure_error(folded - creep + creep.mean())
         finest = resolution(record.displacement)
         hidden = finest > 0.0 and error.sample_variance < (0.5 * finest) ** 2
-        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size) if hidden else 0.0
-        return cls(run, error.points, error.mean, error.of_mean + by_steps)
+        if not hidden:
+            return cls(run, error.points, error.mean, error.of_mean, error.mean.size)
+        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size)
+        power = np.abs(error.mean) ** 2
+        power[1:] *= 2.0
+        return cls(run, error.points, error.mean, error.of_mean + by_steps, _resolved(power, finest))
 
     @cached_property
     def clear(self) -> NDArray[np.bool_]:
         """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
         clear: NDArray[np.bool_] = np.abs(self.harmonics) > SIGNIFICANT_HARMONIC * np.sqrt(self.variance)
         clear[0] = True
+        clear[self.resolved :] = False
         return clear
 
     @cached_property
     def _in_parts(self) -> tuple[ShortTimeMask, Array]:
-        left = self._cycle(np.where(self.clear, 0.0, self.harmonics))
+        resolved = np.arange(self.harmonics.size) < self.resolved
+        left = self._cycle(np.where(self.clear | ~resolved, 0.0, self.harmonics))
         return ShortTimeMask.of(left, self.variance, SIGNIFICANT_HARMONIC)
 
     @cached_property
@@ -316,17 +324,22 @@ def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:
 
 
 def _resolved_below(displacement: Array) -> float:
-    """Return the frequency above which a displacement (n,) holds no more than its steps add [rad/sample].
-
-    Where a step takes several samples its error is no white noise, and its lines would count as motion.
-
-    Equation: the least w with sum_(> w) |x_h|^2 <= q^2 / 12        Source: Morozov 1966, discrepancy principle
-    """
+    """Return the frequency above which a displacement (n,) holds no more than its steps add [rad/sample]."""
     odd, _ = _reflected_odd(displacement)
     power = np.abs(np.fft.rfft(odd)) ** 2 * (2.0 / odd.size**2)
+    return min(_resolved(power, resolution(displacement)) * (2.0 * np.pi / odd.size), np.pi)
+
+
+def _resolved(power: Array, step: float) -> int:
+    """Return the number of the first lines (h,) of a spectrum [m^2] beyond which there is no more than steps [m] add.
+
+    Where a step takes several samples, or the samples meet it at the same places in each cycle, its error is no white
+    noise, and its lines would count as motion.
+
+    Equation: the least h with sum_(>= h) p_h <= q^2 / 12        Source: Morozov 1966, discrepancy principle
+    """
     beyond = np.cumsum(power[::-1])[::-1]
-    first = int(np.searchsorted(-beyond, -(resolution(displacement) ** 2) / 12.0))
-    return min(first * (2.0 * np.pi / odd.size), np.pi)
+    return int(np.searchsorted(-beyond, -(step**2) / 12.0))
 
 
 def _reflected_odd(displacement: Array) -> tuple[Array, Array]:
