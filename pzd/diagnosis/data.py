@@ -189,7 +189,7 @@ class AverageCycle:
     variance: Array
     """(H + 1,) variance |.|^2 of the harmonics by noise and resolution [m^2]."""
     resolved: int
-    """Number of the first harmonics that hold more than the steps of the channel add: the lines of those are no motion."""
+    """Number of the first harmonics, beyond which there is no more than the steps of the channel add: no motion."""
 
     @classmethod
     def of(cls, record: Record, run: Cycles) -> AverageCycle:

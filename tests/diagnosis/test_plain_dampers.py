@@ -130,3 +130,16 @@ def test_coarse_steps_of_a_displacement_that_does_not_repeat_for_them_are_no_gap
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
     check = check_residual(predict(plain, prepared, 5e-4), prepared, wanted, NuisanceConfig())
     assert check.probability["smooth"][0] > 1e-3
+
+
+@pytest.mark.parametrize(("step", "rate", "k"), [(2e-4, 500.0, 2e5), (1e-4, 200.0, 2e5), (5e-5, 1000.0, 1e6)])
+def test_coarse_steps_of_a_displacement_that_repeats_are_no_effect(
+    step: float, rate: float, k: float, rng: Generator
+) -> None:
+    """A stroke of 40 mm in 200 to 800 steps, which the samples of each cycle meet alike: once a false fluid_inertia."""
+    records = [
+        record_of(300.0, 1000.0, k, sine, rng.standard_normal(round(6.0 / sine[0] * rate) + 1), rate) for sine in THREE
+    ]
+    stepped = [replace(each, displacement=step * np.round(each.displacement / step)) for each in records]
+    _, found = diagnosed(stepped)
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("none", ()), found.diagnosis.reason
