@@ -27,14 +27,9 @@ from pzd.report.blocks import (
 from pzd.report.columns import Column, Table
 from pzd.report.config import ReportConfig
 from pzd.report.context import ReportContext
-from pzd.report.damper_models import DamperModels
 from pzd.report.drawing import pictures
 from pzd.report.page import render
 from pzd.report.plots import library
-from pzd.report.reference import compared, file_of, read_reference
-from pzd.report.ride_comfort import RatedRides, assess, rated
-from pzd.report.rig_tests import RigTests
-from pzd.report.run_numbers import RunNumbers
 from pzd.report.sections import passenger, trust
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.study.plan import assumed
@@ -72,22 +67,12 @@ def report_mounted(
     ConfigError : when there is no such file of expected numbers
     DataError : when it is at fault, with every place
     """
-    expected = read_reference(file_of(config.reference, folder), control) if config.reference else None
-    ratings = rated(rides)
-    comfort = tuple(row for ride in ratings for row in assess(ride, config))
-    identified = Identified((), ())
-    reference = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     first = mounted.axles[0]
     diagnosed = Diagnosed.undiagnosed(first.damper or damper_without_force(first.table))
-    context = ReportContext(
-        config, simulate, Rig((), ()), identified, diagnosed, first.table, rides, control, None,
-        RigTests(Rig((), ()), identified, control, None, config.records_shown),
-        DamperModels(diagnosed, ()),
-        RatedRides(ratings, comfort, simulate, control),
-        reference,
-    )  # fmt: skip
+    artefacts = (Rig((), ()), Identified((), ()), diagnosed, first.table, rides)
+    context = ReportContext.of(config, simulate, *artefacts, control, None, folder)
     words = (typewritten(_answer(mounted)),)
-    return Report(comfort=comfort, page=_page(context, mounted, jobs), reference=reference, answer=words)
+    return Report(context.rated.comfort, _page(context, mounted, jobs), reference=context.expected, answer=words)
 
 
 def _page(context: ReportContext, mounted: MountedDampers, jobs: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Report, Rides, Rig, Table
@@ -49,23 +48,10 @@ def report(
     """
     # imported when the stage runs: `pzd check` needs its signature alone
     from pzd.report.context import ReportContext
-    from pzd.report.damper_models import DamperModels
     from pzd.report.page import page, told
-    from pzd.report.reference import compared, file_of, read_reference
-    from pzd.report.ride_comfort import RatedRides, assess, rated
-    from pzd.report.rig_tests import RigTests, setting_in_use
-    from pzd.report.run_numbers import RunNumbers
+    from pzd.report.rig_tests import setting_in_use
 
-    expected = read_reference(file_of(config.reference, folder), control) if config.reference else None
-    ratings = rated(rides)
-    comfort = tuple(row for ride in ratings for row in assess(ride, config))
-    if ratings:
-        logging.getLogger(__name__).info("%d comfort values of %d rides", len(comfort), len(ratings))
-    reference = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     used = setting_in_use(identified, setting)
-    tests = RigTests(rig, identified, control, used, config.records_shown)
-    dampers = DamperModels(diagnosed, tuple(row for row in identified.rows if row.setting == used))
-    rides_rated = RatedRides(ratings, comfort, simulate, control)
     artefacts = (rig, identified, diagnosed, table, rides)
-    context = ReportContext(config, simulate, *artefacts, control, used, tests, dampers, rides_rated, reference)
-    return Report(comfort=comfort, page=page(context, jobs), reference=reference, answer=told(context))
+    context = ReportContext.of(config, simulate, *artefacts, control, used, folder)
+    return Report(context.rated.comfort, page(context, jobs), reference=context.expected, answer=told(context))
