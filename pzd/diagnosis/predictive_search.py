@@ -48,7 +48,7 @@ class CriterionFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
+class _Proposal:
     """A damper that a step of the search may go to, and its prediction error to first order."""
 
     problem: Problem
@@ -57,7 +57,7 @@ class _Trial:
     """W_s of held-out tests, see `CrossValidation.error_to_first_order`."""
 
     @classmethod
-    def of(cls, problem: Problem, fitted: FitResult, validation: CrossValidation) -> _Trial:
+    def of(cls, problem: Problem, fitted: FitResult, validation: CrossValidation) -> _Proposal:
         return cls(problem, fitted, validation.error_to_first_order(problem, fitted).criterion or 0.0)
 
 
@@ -81,7 +81,8 @@ class PredictiveSearch:
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
         while self.validation.campaign.budget.allows_more():
-            better = next(filter(None, (self._best(current, trials) for trials in self._neighbours(current))), None)
+            best = (self._best(current, proposals) for proposals in self._neighbours(current))
+            better = next((found for found in best if found is not None), None)
             if better is None:
                 return current
             log.info("diagnose: %s, W_s of kept-back tests %.4g", _names(better), better.error.criterion)
@@ -92,7 +93,7 @@ class PredictiveSearch:
             self.bent.clear()
         return current
 
-    def _neighbours(self, current: CriterionFit) -> Iterator[list[_Trial]]:
+    def _neighbours(self, current: CriterionFit) -> Iterator[list[_Proposal]]:
         """Yield what a step may go to: one effect more, two more, another in the place of one; each if asked for."""
         added = self._additions(current.problem, current.fitted)
         yield added
@@ -104,9 +105,9 @@ class PredictiveSearch:
         if budget.allows_more():
             yield self._exchanges(current)
 
-    def _best(self, current: CriterionFit, tried: Sequence[_Trial]) -> CriterionFit | None:
+    def _best(self, current: CriterionFit, tried: Sequence[_Proposal]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
-        here = _Trial.of(current.problem, current.fitted, self.validation).estimate
+        here = _Proposal.of(current.problem, current.fitted, self.validation).estimate
         promising = sorted((each for each in tried if each.estimate < here), key=lambda each: each.estimate)
         better = []
         for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
@@ -122,7 +123,7 @@ class PredictiveSearch:
             self.bent |= {*each.fitted.effects} - {*current.fitted.effects}
         return None
 
-    def _additions(self, problem: Problem, fitted: FitResult) -> list[_Trial]:
+    def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""
         found = per_voltage_candidates(problem, fitted)
         found += self._further(problem, fitted, thresholds.SCREENED_EFFECTS)
@@ -148,29 +149,29 @@ class PredictiveSearch:
             found.append(replace(tried, varies=promise.problem is not problem))
         return found
 
-    def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Trial]:
+    def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Proposal]:
         """Return the candidates that move the force visibly, with values that nature has and the tests determine.
 
         Whether one may be off is for the prediction to say: where two of its parameters go together, as the length of a
         pocket and its pressure do, the interval of either holds zero though both together are there.
         """
-        trials = []
+        proposals = []
         for each in found:
             if each.explained < self.config.visible or against_nature(each.fitted.damper):
                 continue
             own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
             if undetermined(own, each.fitted).get(each.effect, MAY_BE_OFF) == MAY_BE_OFF:
-                trials.append(_Trial.of(own, each.fitted, self.validation))
-        return trials
+                proposals.append(_Proposal.of(own, each.fitted, self.validation))
+        return proposals
 
-    def _searched_on(self, trial: _Trial) -> _Trial:
-        """Return a trial at its optimum: candidates are fitted in a few evaluations."""
-        return _Trial.of(trial.problem, refit(trial.problem, trial.fitted.damper), self.validation)
+    def _searched_on(self, proposal: _Proposal) -> _Proposal:
+        """Return a proposal at its optimum: candidates are fitted in a few evaluations."""
+        return _Proposal.of(proposal.problem, refit(proposal.problem, proposal.fitted.damper), self.validation)
 
-    def _exchanges(self, current: CriterionFit) -> list[_Trial]:
+    def _exchanges(self, current: CriterionFit) -> list[_Proposal]:
         """Return what another effect gives in the place of an adopted one, and two in the place of the best such."""
-        trials: list[_Trial] = []
-        here = _Trial.of(current.problem, current.fitted, self.validation).estimate
+        proposals: list[_Proposal] = []
+        here = _Proposal.of(current.problem, current.fitted, self.validation).estimate
         self.alternatives.clear()
         for name in current.fitted.effects:
             if name in self.config.force:
@@ -182,27 +183,27 @@ class PredictiveSearch:
                 tried = self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
                 tried.sort(key=lambda each: each.estimate)
                 tried[:1] = map(self._searched_on, tried[:1])
-                trials += tried
+                proposals += tried
                 if tried and tried[0].estimate < (1.0 + thresholds.LEAST_PREDICTION_GAIN) * here:
                     self.alternatives[name] = tried[0].fitted.effects[-1]
-        if not trials:
+        if not proposals:
             return []
-        best = min(trials, key=lambda each: each.estimate)
+        best = min(proposals, key=lambda each: each.estimate)
         gone = tuple({*current.fitted.effects} - {*best.fitted.effects})
         two = self._further(best.problem, best.fitted, thresholds.EXCHANGED_EFFECTS, gone)
-        return trials + self._possible(best.problem, two)
+        return proposals + self._possible(best.problem, two)
 
 
 def _fewest_parameters_of_alike(
-    better: Sequence[tuple[_Trial, PredictionError]],
-) -> Callable[[tuple[_Trial, PredictionError]], tuple[float, float]]:
-    """Return the order of trials: the best, and those that predict alike, by their parameters, then the others."""
+    better: Sequence[tuple[_Proposal, PredictionError]],
+) -> Callable[[tuple[_Proposal, PredictionError]], tuple[float, float]]:
+    """Return the order of proposals: the best, and those that predict alike, by their parameters, then the others."""
     least = min((error.criterion or 0.0 for _, error in better), default=0.0)
 
-    def order(pair: tuple[_Trial, PredictionError]) -> tuple[float, float]:
-        trial, criterion = pair[0], pair[1].criterion or 0.0
+    def order(pair: tuple[_Proposal, PredictionError]) -> tuple[float, float]:
+        proposal, criterion = pair[0], pair[1].criterion or 0.0
         alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * criterion <= least
-        return (float(trial.fitted.optimum.size) if alike else np.inf), criterion
+        return (float(proposal.fitted.optimum.size) if alike else np.inf), criterion
 
     return order
 
