@@ -121,7 +121,12 @@ def test_exports_hold_the_table_of_each_axle_and_no_dynamics(capsys: pytest.Capt
     np.testing.assert_allclose(points[:, 1], 2500.0 * points[:, 0], atol=1e-3)
     capsys.readouterr()
     assert status(["export", "two.yaml", "--to", "fmu"]) == 2
-    assert "a measured curve has none" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "a measured curve has none" in said
+    offered = said.strip().partition("a form of its table, ")[2].split(", ")
+    assert len(offered) > 4
+    for form in offered:
+        assert status(["export", "two.yaml", "--to", form, "--out", form]) == 0
 
 
 @pytest.mark.parametrize(

@@ -69,9 +69,13 @@ def exported(
     if edited:
         log.warning("%s: edited by hand: %s; exported as it is", given.run.folder, ", ".join(edited))
     if wanted.dynamics and any(content.by_curve for content in contents):
+        adjustable = all(content.adjustable for content in contents)
+        forms = [
+            f.name for f in formats().values() if not f.dynamics and f.name != DRIVE and f.adjustable <= adjustable
+        ]
         raise ConfigError(
             f"--to {to}: it holds the dynamics of a damper, and a measured curve has none; choose a form of its table, "
-            f"{', '.join(name for name, one in formats().items() if not one.dynamics)}"
+            f"{', '.join(forms)}"
         )
     if wanted.name == DRIVE:
         contents = tuple(replace(one, drive=_drive(given, one, waveform)) for one in contents)

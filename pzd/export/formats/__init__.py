@@ -42,6 +42,8 @@ class Format:
     """The library that writes it, an extra; None where pzd itself needs it anyway."""
     dynamics: bool = False
     """Whether it holds more of the damper than its table, which is all that there is of a measured curve."""
+    adjustable: bool = False
+    """Whether there is nothing to write of a damper without a second value of the control signal."""
     ending: str | None = None
     """Ending of the files' names where their number depends on the damper; None where it does not."""
 

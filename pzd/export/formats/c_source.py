@@ -133,7 +133,7 @@ SINGLE = "-DDAMPER_SINGLE"
 """What builds the sources in single precision."""
 
 FORMATS = (
-    Format(NAME, "table, inverse and comfort law for a control unit", files),
+    Format(NAME, "table, inverse and comfort law for a control unit", files, adjustable=True),
     Format(
         "c-dynamics",
         "the damper with its dynamics in C, double or single precision",
