@@ -2,10 +2,11 @@
 
 PyYAML splits the text into events. The meaning of the events is decided here, as no library has all of it: scalars of
 the YAML 1.2 core schema without coercion, the place of every key and value, keys that are text and unique, no tags,
-nothing nested deeper than `DEEPEST`, aliases only while they stay small. ruamel.yaml 0.19 reads 1_000, 0b1 and
-2020-01-01 as numbers and dates, takes tags, keys of any type and aliases inside of their anchors, knows no limits, and
-has the syntax errors of PyYAML ("expected ',' or ']', but got ':'" in the line after a bracket that is not closed). It
-would replace a quarter of this file at most. `explained` finds the mistake behind such an error, and its remedy.
+nothing nested deeper than `DEEPEST`, aliases only while they stay small, merge keys. ruamel.yaml 0.19 reads 1_000, 0b1
+and 2020-01-01 as numbers and dates, takes tags, keys of any type and aliases inside of their anchors, knows no limits,
+and has the syntax errors of PyYAML ("expected ',' or ']', but got ':'" in the line after a bracket that is not
+closed). It would replace a quarter of this file at most. `explained` finds the mistake behind such an error, and its
+remedy.
 """
 
 from __future__ import annotations
@@ -365,8 +366,9 @@ class _Composer:
         return tuple(found)
 
     def entries(self, path: tuple[str, ...], depth: int) -> dict[str, Entry]:
-        """Build the entries of a mapping up to its end."""
+        """Build the entries of a mapping up to its end; those merged by ``<<`` stand behind its own."""
         found: dict[str, Entry] = {}
+        merged: dict[str, Entry] = {}
         while not isinstance(event := next(self.events), yaml.MappingEndEvent):
             key = self.node(event, path, depth).value
             name = key if isinstance(key, str) else getattr(event, "value", "")
@@ -374,7 +376,25 @@ class _Composer:
                 self.fault(event, path, f"a key must be text; put it in quotes (got {name or 'no text'})")
             elif key in found:
                 self.fault(event, (*path, key), f"the key is given a second time (first at {found[key].place})")
-            found[name] = Entry(self.place(event), self.node(next(self.events), (*path, name), depth))
+            node = self.node(next(self.events), (*path, name), depth)
+            if name == "<<" and event.implicit[0]:
+                merged = self.merged(event, path, node) | merged
+            else:
+                found[name] = Entry(self.place(event), node)
+        return found | {key: entry for key, entry in merged.items() if key not in found}
+
+    def merged(self, event: Any, path: tuple[str, ...], node: Node) -> dict[str, Entry]:
+        """Return the entries that a merge key adds, of a mapping or a list of them; the first that has a key wins.
+
+        Merge keys are of YAML 1.1 (https://yaml.org/type/merge.html), and used wherever anchors are.
+        """
+        sources = node.value if isinstance(node.value, tuple) else (node,)
+        found: dict[str, Entry] = {}
+        for source in sources:
+            if isinstance(source.value, Mapping):
+                found = {**source.value, **found}
+            else:
+                self.fault(event, path, f"<< must give a mapping, such as <<: *name (got {source.data()})")
         return found
 
     def scalar(self, event: Any, path: tuple[str, ...]) -> Scalar:

@@ -124,6 +124,7 @@ def test_a_written_scalar_reads_back_as_itself(tmp_path_factory: pytest.TempPath
         ("inner: " + "[" * 101 + "]" * 101, "c.yaml:1:107: nested deeper than 100 levels"),
         ("inner: &a [*a]\n", "c.yaml:1:12: an alias inside its own anchor never ends (got *a)"),
         ("name: *a\n", "c.yaml:1:7: no anchor of this name stands before it (got *a)"),
+        ("inner: {<<: 3}\n", "c.yaml:1:9: inner: << must give a mapping, such as <<: *name (got 3)"),
         ("name: {a\n", "c.yaml:1:7: the { that opens here is not closed; put } at its end"),
         ("name: a: b\n", "c.yaml:1:8: a second colon in one line; put the text in quotes"),
         ("name: \x07\n", "c.yaml:1:7: a character that YAML does not allow (got U+0007)"),
@@ -159,6 +160,18 @@ def test_a_hundred_levels_are_read(tmp_path: Path) -> None:
 
 def test_aliases_are_read_while_they_stay_small(tmp_path: Path) -> None:
     assert read(tmp_path, "inner: [&a {voltage_V: 3}, *a]\n").inner == (Inner(voltage_V=3.0),) * 2
+
+
+def test_a_merge_key_adds_what_a_mapping_does_not_say_itself(tmp_path: Path) -> None:
+    path = tmp_path / "merged.yaml"
+    path.write_text(
+        "a: &a {p: 1, q: 2}\nb: &b {q: 3, r: 4}\n"
+        "first: {q: 5, <<: *a}\nlast: {<<: *a, q: 5}\nboth: {<<: [*a, *b], s: 6}\nquoted: {'<<': 7}\n"
+    )
+    data = read_yaml(path).data
+    assert data["first"] == data["last"] == {"p": 1, "q": 5}
+    assert data["both"] == {"p": 1, "q": 2, "r": 4, "s": 6}
+    assert data["quoted"] == {"<<": 7}
 
 
 def test_a_bomb_of_aliases_is_refused_before_it_goes_off(tmp_path: Path) -> None:
