@@ -17,13 +17,13 @@ from uuid import UUID
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pzd.damper import compose, path, regimes
+from pzd.damper import compose, flow, path, regimes
 from pzd.damper.compiled import kernels
-from pzd.damper.compiled.columns import PARALLEL, STROKE_AND_FLOW, acting, columns_of
+from pzd.damper.compiled.columns import DRIVE, PARALLEL, STROKE_AND_FLOW, acting, columns_of
 from pzd.damper.compiled.kernels import T0, C, K
 from pzd.damper.compose import BRANCHES, TOLERANCE
 from pzd.damper.confounders import module_of
-from pzd.damper.effect import ELEMENT, arguments, functions
+from pzd.damper.effect import ELEMENT, Effect, arguments, functions
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import MATERIAL_FACTORS, drive_row_of, element_rows, nodes_of
 from pzd.export.content import Content
@@ -89,6 +89,7 @@ def _pointed(text: str) -> str:
 SHARED: tuple[Callable[..., object], ...] = (
     *(path.advance, path.off_the_limits, regimes.deflection_at, regimes.spring_force, compose.advance_branches),
     *(kernels.follow_voltage, kernels.parallel_force, kernels.branches_follow, kernels.branch_force),
+    *(flow.flow_speed, flow.breakaway, flow.relief, regimes.over_yield),
 )
 """Functions of pzd that `sources/element.c` calls; what these call is translated with them."""
 
@@ -105,7 +106,7 @@ def laws() -> tuple[str, str]:
     try:
         for function in SHARED:
             written.add(function)
-        material = _material(written)
+        material, rates = _material(written), _drive_rates(written)
     except UntranslatableError as error:
         raise ConfigError(f"{error}; write the law in numbers, `math` and `if` alone") from error
     sizes = {"ROW": ROW, "STATES": path.STATES, "DRIVES": max(len(acting("drive")), 1), "BRANCHES": max(BRANCHES, 1)}
@@ -119,11 +120,12 @@ def laws() -> tuple[str, str]:
             written.types(),
             "\nreal least(real one, real other);\nreal most(real one, real other);\n",
             written.prototypes(shared=True),
-            f"{material.partition(chr(10))[0]};\n\n#endif\n",
+            *(f"{line};\n" for line in (material + rates).splitlines() if line[:1] not in "{} "),
+            "\n#endif\n",
         )
     )
-    body = f'#include "laws.h"\n\n{_EXTREMES}\n{written.prototypes(shared=False)}\n{written.definitions()}\n{material}'
-    return head, body
+    parts = (_EXTREMES, written.prototypes(shared=False), written.definitions(), material + rates)
+    return head, '#include "laws.h"\n\n' + "\n".join(parts)
 
 
 _EXTREMES = """real least(real one, real other)
@@ -151,7 +153,21 @@ def _material(written: Translation) -> str:
     limits = f"const real_real moved = {written.add(path.off_the_limits)}(p.at[{T0}], p.at[{C}], p.at[{K}]);"
     lines += [limits, f"p.at[{C}] = moved.at0;", f"p.at[{K}] = moved.at1;", "return p;"]
     body = "".join(f"    {line}\n" for line in lines)
-    return f"row material(row p, const real *own, real temperature, real reference)\n{{\n{body}}}\n"
+    return f"row material(row p, const real *own, real temperature, real reference)\n{{\n{body}}}\n\n"
+
+
+def _drive_rates(written: Translation) -> str:
+    """Write the rates of the effective signals, one behind another, while the control signal stands at a value."""
+    lines = []
+    for i, effect in enumerate(acting("drive")):
+        law = functions(effect, module_of(effect))["rate"]
+        given = {p.name: f"p[{DRIVE.index((effect.name, p.name))}]" for p in effect.parameters}
+        acts = " || ".join(f"{given[p.name]} != {number(p.neutral)}" for p in effect.parameters)
+        given |= {"effective": f"state[{i}]", "now": "now", "rate": "R(0.0)"}
+        called = f"{written.add(law)}({', '.join(given[a] for a in arguments(law))})"
+        lines += [f"if ({acts}) {{", f"    rates[{i}] = {called};", f"    now = state[{i}];", "}"]
+    body = "".join(f"    {line}\n" for line in lines)
+    return f"void drive_rates(real now, const real *state, const real *p, real *rates)\n{{\n{body}}}\n\n"
 
 
 # --- The damper as constants ---
@@ -214,6 +230,62 @@ def _beside(count: int, *parts: Array) -> Array:
     return np.hstack([np.broadcast_to(part, (count, part.shape[1])) for part in parts])
 
 
+# --- Continuous states, for model exchange ---
+
+
+@dataclass(frozen=True)
+class State:
+    """A continuous state of the damper."""
+
+    name: str
+    place: int
+    """In the row of `element_rates`: the deflection of the oil spring, then the drive."""
+    nominal: float
+    """Its size in use, by which a solver takes its tolerance."""
+    of: Effect | None = None
+    """Of the drive; None for that of the element."""
+
+
+def states_of(damper: Damper, dynamics: Dynamics) -> tuple[State, ...]:
+    """Return the continuous states: the deflection of the oil spring, and the signal behind each effect of the drive.
+
+    The branches have none: `sources/model.c` takes their closed form over the way of the rod since it last turned.
+    """
+    friction, damping, stiffness = (dynamics.rows[..., column].ravel() for column in (T0, C, K))
+    damps, spring = path.off_the_limits(friction, damping, stiffness)
+    found = [State("deflection", 0, float(np.max((friction + damps) / spring)))]
+    signal = float(np.max(np.abs(dynamics.signals))) or 1.0
+    for i, effect in enumerate(acting("drive")):
+        if _is_on(effect, damper):
+            found.append(State(f"{effect.name}_signal", 1 + i, signal, effect))
+    return tuple(found)
+
+
+def _is_on(effect: Effect, damper: Damper) -> bool:
+    """Return whether an effect of a damper acts."""
+    given = damper.effects.get(effect.name, {})
+    return any(np.any(np.asarray(given.get(p.name, p.neutral)) != p.neutral) for p in effect.parameters)
+
+
+def no_exchange(damper: Damper) -> str | None:
+    """Return why a damper has no equations of state for model exchange; None where it has them.
+
+    A signal that follows another one's rate has none: what comes into the damper is the signal, not its rate.
+    """
+    for effect in acting("drive"):
+        if _is_on(effect, damper):
+            law = functions(effect, module_of(effect))["rate"]
+            given = {p.name: damper.effects[effect.name].get(p.name, p.neutral) for p in effect.parameters}
+            rates = [
+                law(**{a: (given | {"effective": 0.0, "now": now, "rate": 1.0})[a] for a in arguments(law)})
+                - law(**{a: (given | {"effective": 0.0, "now": now, "rate": 0.0})[a] for a in arguments(law)})
+                for now in (*given.values(), 0.0)
+            ]
+            if any(rates):
+                return f"{effect.name} follows the rate of the control signal, which a solver does not give"
+    return None
+
+
 def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
     """Return start values of inputs and parameters by their name in C."""
     nearest = float(dynamics.signals[np.argmin(np.abs(dynamics.signals))])
@@ -231,6 +303,9 @@ def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
     numbers = {"REFERENCE_TEMPERATURE": dynamics.reference, **start_values(content, dynamics)}
     sizes = {"TEMPERATURE_NODES": dynamics.temperatures.size, "SIGNAL_NODES": dynamics.signals.size}
     sizes |= {"PARALLEL": len(PARALLEL), "COLUMNS": dynamics.rows.shape[2]}
+    states = () if no_exchange(content.damper) else states_of(content.damper, dynamics)
+    sizes |= {"CONTINUOUS": len(states)}
+    kept = states or (State("none", 0, 1.0),)  # C has no empty arrays
     body = "".join(
         (
             f"enum {{ {', '.join(VARIABLES).upper()}, VARIABLES }};\n",
@@ -243,6 +318,8 @@ def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
             array("real", "TEMPERATURES", dynamics.temperatures, real),
             array("real", "SIGNALS", dynamics.signals, real),
             array("real", "ROWS", dynamics.rows, real),
+            array("int", "STATE_PLACES", [one.place for one in kept], lambda place: str(int(place))),
+            array("double", "STATE_NOMINALS", [one.nominal for one in kept], lambda nominal: repr(float(nominal))),
         )
     )
     token = str(UUID(bytes=sha256(f"{content.origin}\n{content.name}\n{body}{laws()}".encode()).digest()[:16]))

@@ -15,13 +15,15 @@ from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 from pzd.export.content import Content
-from pzd.export.dynamics import OF_THE_RIG, VARIABLES, Dynamics, start_values
+from pzd.export.dynamics import OF_THE_RIG, VARIABLES, Dynamics, no_exchange, start_values, states_of
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, TEMPERATURE, TIME, VELOCITY, Quantity
 from pzd.schema.errors import FilesError
 
 IDENTIFIER = "damper"
 """Name of the model in C, and of the library."""
-Causality = Literal["input", "output", "parameter", "independent"]
+Causality = Literal["input", "output", "parameter", "independent", "local"]
+INDICATORS = 5
+"""Event indicators, those of `sources/element.h`: yield and relief valve to either side, and the turn of the rod."""
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "s": {"s": 1},
     "m": {"m": 1},
@@ -31,6 +33,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "A": {"A": 1},
     "degC": {"K": 1, "offset": 273.15},
+    "1": {},
 }
 """Units by the exponents of the base units."""
 
@@ -41,11 +44,34 @@ class Variable:
 
     name: str
     reference: int
-    """Its place in `VARIABLES`."""
+    """Its place in `VARIABLES`; states, rates and indicators stand behind them."""
     causality: Causality
     unit: str
     meaning: str
     start: float | None = None
+    nominal: float | None = None
+    rate_of: int | None = None
+    """Reference of the state whose rate it is."""
+
+
+def equations(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
+    """Return the states and their rates, one after the other; none where there is no model exchange.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    """
+    found = list[Variable]()
+    for state in () if no_exchange(content.damper) else states_of(content.damper, dynamics):
+        place, unit = len(VARIABLES) + len(found), "m"
+        meaning = "elastic deflection of the oil spring"
+        if state.of is not None:
+            unit, meaning = content.control.quantity.unit, f"control signal behind {state.of.name}"
+        found.append(Variable(state.name, place, "local", unit, meaning, nominal=state.nominal))
+        rate = Variable(f"{state.name}_rate", place + 1, "local", f"{unit}/s", f"rate of {state.name}", rate_of=place)
+        found.append(rate)
+    return tuple(found)
 
 
 def variables(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
@@ -104,23 +130,34 @@ def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str
     token : by which the library knows the description
     sources : names of the files to compile
     """
-    found = variables(content, dynamics)
+    solved = equations(content, dynamics)
+    found = (*variables(content, dynamics), *solved)
     output = next(place for place, one in enumerate(found, 1) if one.causality == "output")
+    places = {one.reference: place for place, one in enumerate(found, 1)}
     states = ("canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions")
-    cosimulation = (
-        _open("CoSimulation", _abilities(*states, "canInterpolateInputs", "providesDirectionalDerivative")),
-        "<SourceFiles>",
-        *(_alone("File", {"name": name}) for name in sources),
-        "</SourceFiles></CoSimulation>",
-    )
-    scalars = (
-        _open("ScalarVariable", _attributes(one)) + _alone("Real", _number(one)) + "</ScalarVariable>" for one in found
-    )
+    files = ("<SourceFiles>", *(_alone("File", {"name": name}) for name in sources), "</SourceFiles>")
+    derived = (*states, "providesDirectionalDerivative")
+    exchange = (_open("ModelExchange", _abilities(*derived)), *files, "</ModelExchange>") if solved else ()
+    steps = ("canHandleVariableCommunicationStepSize", "canInterpolateInputs")
+    cosimulation = (_open("CoSimulation", _abilities(*steps, *derived)), *files, "</CoSimulation>")
+
+    def real_of(one: Variable) -> str:
+        rate = {} if one.rate_of is None else {"derivative": str(places[one.rate_of])}
+        return _alone("Real", _number(one) | rate)
+
+    def unknowns(kind: str, among: Iterable[int]) -> str:
+        listed = "".join(_alone("Unknown", {"index": str(place)}) for place in among)
+        return f"<{kind}>{listed}</{kind}>"
+
+    scalars = (_open("ScalarVariable", _attributes(one)) + real_of(one) + "</ScalarVariable>" for one in found)
+    rates = [places[one.reference] for one in solved if one.rate_of is not None]
     structure = (
-        f'<Outputs><Unknown index="{output}"/></Outputs>',
-        f'<InitialUnknowns><Unknown index="{output}"/></InitialUnknowns>',
+        unknowns("Outputs", [output]),
+        *([unknowns("Derivatives", rates)] if rates else []),
+        unknowns("InitialUnknowns", [output, *(places[one.reference] for one in solved)]),
     )
-    return _description_of(content, "2.0", {"guid": token}, (*cosimulation, *_units(found)), scalars, structure)
+    head = {"guid": token} | ({"numberOfEventIndicators": str(INDICATORS)} if solved else {})
+    return _description_of(content, "2.0", head, (*exchange, *cosimulation, *_units(found)), scalars, structure)
 
 
 def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
@@ -133,15 +170,33 @@ def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
     token : by which the library knows the description
     """
     time = Variable(TIME.name, _reference("time"), "independent", TIME.unit, "simulated time")
-    found = (*variables(content, dynamics), time)
+    solved = equations(content, dynamics)
+    first = len(VARIABLES) + len(solved)
+    indicators = [
+        Variable(f"indicator_{i + 1}", first + i, "local", "1", "changes its sign where an equation bends or jumps")
+        for i in range(INDICATORS if solved else 0)
+    ]
+    found = (*variables(content, dynamics), *solved, *indicators, time)
     output = next(one.reference for one in found if one.causality == "output")
-    cosimulation = _alone(
-        "CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives")
+    states = ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives")
+    exchange = [_alone("ModelExchange", _abilities("needsCompletedIntegratorStep", *states))] if solved else []
+    cosimulation = _alone("CoSimulation", _abilities("canHandleVariableCommunicationStepSize", *states))
+
+    def float_of(one: Variable) -> str:
+        rate = {} if one.rate_of is None else {"derivative": str(one.rate_of)}
+        return _alone("Float64", _attributes(one) | _number(one) | rate)
+
+    def unknowns(kind: str, among: Iterable[int]) -> list[str]:
+        return [_alone(kind, {"valueReference": str(reference)}) for reference in among]
+
+    structure = (
+        *unknowns("Output", [output]),
+        *unknowns("ContinuousStateDerivative", [one.reference for one in solved if one.rate_of is not None]),
+        *unknowns("InitialUnknown", [output, *(one.reference for one in solved)]),
+        *unknowns("EventIndicator", [one.reference for one in indicators]),
     )
-    floats = (_alone("Float64", _attributes(one) | _number(one)) for one in found)
-    structure = (f'<Output valueReference="{output}"/>', f'<InitialUnknown valueReference="{output}"/>')
-    token_of = {"instantiationToken": token}
-    return _description_of(content, "3.0", token_of, (cosimulation, *_units(found)), floats, structure)
+    token_of, interfaces = {"instantiationToken": token}, (*exchange, cosimulation, *_units(found))
+    return _description_of(content, "3.0", token_of, interfaces, map(float_of, found), structure)
 
 
 def _description_of(
@@ -177,8 +232,7 @@ def build_description(sources: Sequence[str]) -> str:
     )
 
 
-def _abilities(*states: str) -> dict[str, str]:
-    names = ("canHandleVariableCommunicationStepSize", *states)
+def _abilities(*names: str) -> dict[str, str]:
     return {"modelIdentifier": IDENTIFIER} | dict.fromkeys(names, "true")
 
 
@@ -186,12 +240,13 @@ def _attributes(one: Variable) -> dict[str, str]:
     fixed = {"parameter": "fixed"}.get(one.causality, "continuous")
     found = {"name": one.name, "valueReference": str(one.reference), "description": one.meaning}
     found |= {"causality": one.causality, "variability": fixed}
-    initial = {"output": "calculated", "parameter": "exact"}.get(one.causality)
+    initial = {"output": "calculated", "local": "calculated", "parameter": "exact"}.get(one.causality)
     return found | ({"initial": initial} if initial else {})
 
 
 def _number(one: Variable) -> dict[str, str]:
-    return {"unit": one.unit} | ({"start": repr(float(one.start))} if one.start is not None else {})
+    numbers = {"start": one.start, "nominal": one.nominal}
+    return {"unit": one.unit} | {name: repr(float(value)) for name, value in numbers.items() if value is not None}
 
 
 def _units(found: Sequence[Variable]) -> list[str]:

@@ -286,7 +286,7 @@ int main(void)
     static const unsigned inputs[] = {DISPLACEMENT, VELOCITY, ACCELERATION, SIGNAL, TEMPERATURE}, output[] = {FORCE};
     model m;
     double step, value[5], time = 0.0, force;
-    model_reset(&m);
+    model_reset(&m, 0);
     while (scanf("%lf %lf %lf %lf %lf %lf", &step, &value[0], &value[1], &value[2], &value[3], &value[4]) == 6) {
         if (model_set(&m, inputs, 5, value) != NULL)
             return 1;

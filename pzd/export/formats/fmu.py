@@ -1,11 +1,12 @@
-"""FMI 2.0 and 3.0 co-simulation: the damper with its dynamics in plain C, with its sources.
+"""FMI 2.0 and 3.0, co-simulation and model exchange: the damper with its dynamics in plain C, with its sources.
 
-Inputs are held over a communication step, or go linearly by the derivatives that FMI 2.0 takes; within it the path is
-that of our own march.
+In co-simulation inputs are held over a communication step, or go linearly by the derivatives that FMI 2.0 takes; within
+it the path is that of our own march. In model exchange the tool that imports it integrates the same laws.
 """
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 from pzd.export.formats import Files, Format
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
     from pzd.export.content import Content
     from pzd.record import Record
 
+log = logging.getLogger(__name__)
+
 NAME = "fmu"
+_MEANING = "the damper with its dynamics for co-simulation and model exchange, FMI 2.0 and 3.0"
 _COMMON = ("model.c",)
 _HEADERS = ("export.h", "model.h")
 
@@ -62,10 +66,12 @@ def _name(content: Content, version: int) -> str:
 
 def _built(content: Content) -> dict[int, dict[str, bytes]]:
     """Return the members of the archives by the version of FMI."""
-    from pzd.export.dynamics import ELEMENT_SOURCES, Dynamics, element_files, source
+    from pzd.export.dynamics import ELEMENT_SOURCES, Dynamics, element_files, no_exchange, source
     from pzd.export.fmi import IDENTIFIER, build_description, compiled_library, fmi2, fmi3, folders, suffix
 
     dynamics = Dynamics.of(content.damper)
+    if reason := no_exchange(content.damper):
+        log.warning("the FMUs are for co-simulation alone, without model exchange: %s", reason)
     element, token = element_files(content, dynamics)
     found = {}
     for version, folder in zip((2, 3), folders(), strict=True):
@@ -100,6 +106,4 @@ def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     return written.getvalue()
 
 
-FORMATS = (
-    Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files, certified, dynamics=True),
-)
+FORMATS = (Format(NAME, _MEANING, files, certified, dynamics=True),)

@@ -127,3 +127,34 @@ real element_force(element_state state, const element_inputs *inputs)
     return regimes_spring_force(state.path[0], p.element) + kernels_branch_force(R(0.0), state.branches, p.parallel) +
            kernels_parallel_force(inputs->displacement, inputs->velocity, inputs->acceleration, p.parallel);
 }
+
+static parameters parameters_now(const element_state *state, const element_inputs *inputs)
+{
+    element_state passed = *state;
+    return parameters_at(settled(&passed, inputs->signal), inputs->temperature);
+}
+
+void element_rates(element_state state, const element_inputs *inputs, real rates[RATES], real indicators[INDICATORS])
+{
+    const real drive[] = DRIVE;
+    const parameters p = parameters_now(&state, inputs);
+    const real force = regimes_spring_force(state.path[0], p.element), side = M(copysign)(R(1.0), force);
+    for (int n = 0; n < RATES; n++)
+        rates[n] = R(0.0);
+    rates[DEFLECTION_RATE] = inputs->velocity - side * flow_flow_speed(M(fabs)(force), p.element, side, R(0.0));
+    drive_rates(inputs->signal, state.drive, drive, rates + DRIVE_RATES);
+    for (int n = 0; n < 2; n++) {
+        const real to = n == 0 ? R(1.0) : R(-1.0), opens = flow_relief(p.element, to);
+        const real above = regimes_over_yield(state.path[0], p.element, to);
+        indicators[YIELDS + n] = above;
+        indicators[RELIEFS + n] = isfinite(opens) ? above + flow_breakaway(p.element, to) - opens : R(-1.0);
+    }
+    indicators[TURNS] = inputs->velocity;
+}
+
+element_state element_moved(element_state state, const element_inputs *inputs, real travel)
+{
+    parameters p = parameters_now(&state, inputs);
+    kernels_branches_follow(travel, state.branches, p.parallel);
+    return state;
+}

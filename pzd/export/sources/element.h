@@ -34,4 +34,16 @@ element_state element_after(element_state state, const element_inputs *start, co
 /* Force at the rod [N]. */
 real element_force(element_state state, const element_inputs *inputs);
 
+/* The equations of state, for a solver: places of the deflection and of the drive in a row of their rates. */
+enum { DEFLECTION_RATE, DRIVE_RATES, RATES = DRIVE_RATES + DRIVES };
+
+/* What changes its sign where a rate bends: at yield and at the relief valve to either side, and where the rod turns. */
+enum { YIELDS, RELIEFS = YIELDS + 2, TURNS = RELIEFS + 2, INDICATORS };
+
+/* Rates of the states, and the indicators, at one moment. */
+void element_rates(element_state state, const element_inputs *inputs, real rates[RATES], real indicators[INDICATORS]);
+
+/* The state with its branches after a travel [m] of the rod to one side. */
+element_state element_moved(element_state state, const element_inputs *inputs, real travel);
+
 #endif

@@ -1,4 +1,4 @@
-/* FMI 2.0 for co-simulation; see https://fmi-standard.org. */
+/* FMI 2.0 for co-simulation and model exchange; see https://fmi-standard.org. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,6 +15,11 @@ typedef char fmi2Byte;
 typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
 typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
 typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated } fmi2StatusKind;
+typedef struct {
+    fmi2Boolean newDiscreteStatesNeeded, terminateSimulation, nominalsOfContinuousStatesChanged;
+    fmi2Boolean valuesOfContinuousStatesChanged, nextEventTimeDefined;
+    fmi2Real nextEventTime;
+} fmi2EventInfo;
 typedef struct {
     void (*logger)(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String, ...);
     void *(*allocateMemory)(size_t, size_t);
@@ -62,11 +67,11 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
                                      const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     instance *self;
-    if (type != fmi2CoSimulation || name == NULL || guid == NULL || strcmp(guid, TOKEN) != 0)
+    if ((type != fmi2CoSimulation && CONTINUOUS == 0) || name == NULL || guid == NULL || strcmp(guid, TOKEN) != 0)
         return NULL;
     self = calloc(1, sizeof *self + strlen(name) + 1);
     if (self != NULL) {
-        model_reset(&self->damper);
+        model_reset(&self->damper, type == fmi2ModelExchange);
         self->callbacks = callbacks;
         strcpy(self->name, name);
     }
@@ -103,7 +108,7 @@ EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 
 EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
-    model_reset(damper_of(c));
+    model_reset(damper_of(c), damper_of(c)->exchanged);
     return fmi2OK;
 }
 
@@ -214,3 +219,59 @@ STATUS(BooleanStatus, fmi2Boolean, fmi2Terminated, 0)
 NO_STATUS(Status, fmi2Status)
 NO_STATUS(IntegerStatus, fmi2Integer)
 NO_STATUS(StringStatus, fmi2String)
+
+/* Model exchange. */
+static const char *const NO_SUCH_COUNT = "this is not the number of states or indicators";
+
+EXPORT fmi2Status fmi2EnterEventMode(fmi2Component c)
+{
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
+{
+    const fmi2EventInfo nothing = {0, 0, 0, 0, 0, 0.0};
+    model_remember(damper_of(c));
+    *info = nothing;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
+{
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean keeps, fmi2Boolean *event, fmi2Boolean *ends)
+{
+    model_remember(damper_of(c));
+    *event = *ends = 0;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
+{
+    damper_of(c)->values[TIME] = time;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real states[], size_t count)
+{
+    if (count != CONTINUOUS)
+        return checked(c, NO_SUCH_COUNT);
+    model_set_states(damper_of(c), states);
+    return fmi2OK;
+}
+
+#define SOLVED(name, expected, filled)                                           \
+    EXPORT fmi2Status fmi2Get##name(fmi2Component c, fmi2Real found[], size_t count) \
+    {                                                                            \
+        if (count != expected)                                                   \
+            return checked(c, NO_SUCH_COUNT);                                    \
+        filled;                                                                  \
+        return fmi2OK;                                                           \
+    }
+
+SOLVED(ContinuousStates, CONTINUOUS, model_states(damper_of(c), found))
+SOLVED(Derivatives, CONTINUOUS, model_rates(damper_of(c), found))
+SOLVED(EventIndicators, INDICATORS, model_indicators(damper_of(c), found))
+SOLVED(NominalsOfContinuousStates, CONTINUOUS, model_nominals(found))

@@ -1,4 +1,4 @@
-/* FMI 3.0 for co-simulation; see https://fmi-standard.org. */
+/* FMI 3.0 for co-simulation and model exchange; see https://fmi-standard.org. */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -65,29 +65,35 @@ EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t cou
     return fmi3OK;
 }
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
-                                                fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean eventMode,
-                                                fmi3Boolean earlyReturn, const fmi3ValueReference intermediate[],
-                                                size_t count, fmi3InstanceEnvironment environment,
-                                                fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
+static fmi3Instance begun(fmi3String token, int exchanged, fmi3InstanceEnvironment environment,
+                          fmi3LogMessageCallback log)
 {
     instance *self;
     if (token == NULL || strcmp(token, TOKEN) != 0)
         return NULL;
     self = calloc(1, sizeof *self);
     if (self != NULL) {
-        model_reset(&self->damper);
+        model_reset(&self->damper, exchanged);
         self->environment = environment;
         self->log = log;
     }
     return self;
 }
 
+EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+                                                fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean eventMode,
+                                                fmi3Boolean earlyReturn, const fmi3ValueReference intermediate[],
+                                                size_t count, fmi3InstanceEnvironment environment,
+                                                fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
+{
+    return begun(token, 0, environment, log);
+}
+
 EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                                  fmi3Boolean visible, fmi3Boolean logging,
                                                  fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
-    return NULL;
+    return CONTINUOUS == 0 ? NULL : begun(token, 1, environment, log);
 }
 
 EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -124,7 +130,7 @@ EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
 
 EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 {
-    model_reset(damper_of(c));
+    model_reset(damper_of(c), damper_of(c)->exchanged);
     return fmi3OK;
 }
 
@@ -193,6 +199,75 @@ EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[]
     return checked(c, model_read(bytes, size, state));
 }
 
+/* Model exchange. */
+static const char *const NO_SUCH_COUNT = "this is not the number of states or indicators";
+
+EXPORT fmi3Status fmi3EnterEventMode(fmi3Instance c)
+{
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *ends, fmi3Boolean *nominals,
+                                           fmi3Boolean *states, fmi3Boolean *defined, fmi3Float64 *next)
+{
+    model_remember(damper_of(c));
+    *again = *ends = *nominals = *states = *defined = false;
+    *next = 0.0;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
+{
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean keeps, fmi3Boolean *event, fmi3Boolean *ends)
+{
+    model_remember(damper_of(c));
+    *event = *ends = false;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
+{
+    damper_of(c)->values[TIME] = time;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 states[], size_t count)
+{
+    if (count != CONTINUOUS)
+        return checked(c, NO_SUCH_COUNT);
+    model_set_states(damper_of(c), states);
+    return fmi3OK;
+}
+
+#define SOLVED(name, expected, filled)                                                 \
+    EXPORT fmi3Status fmi3Get##name(fmi3Instance c, fmi3Float64 found[], size_t count) \
+    {                                                                                  \
+        if (count != expected)                                                         \
+            return checked(c, NO_SUCH_COUNT);                                          \
+        filled;                                                                        \
+        return fmi3OK;                                                                 \
+    }
+
+SOLVED(ContinuousStates, CONTINUOUS, model_states(damper_of(c), found))
+SOLVED(ContinuousStateDerivatives, CONTINUOUS, model_rates(damper_of(c), found))
+SOLVED(EventIndicators, INDICATORS, model_indicators(damper_of(c), found))
+SOLVED(NominalsOfContinuousStates, CONTINUOUS, model_nominals(found))
+
+EXPORT fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *count)
+{
+    *count = CONTINUOUS;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *count)
+{
+    *count = INDICATORS;
+    return fmi3OK;
+}
+
 /* What the standard has beyond it, and this damper does not. */
 #define REFUSED(name, ...)                         \
     EXPORT fmi3Status name(fmi3Instance c, __VA_ARGS__) \
@@ -239,21 +314,8 @@ REFUSED(fmi3SetIntervalDecimal, REFERENCES, const fmi3Float64 intervals[])
 REFUSED(fmi3SetIntervalFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 REFUSED(fmi3SetShiftDecimal, REFERENCES, const fmi3Float64 shifts[])
 REFUSED(fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-REFUSED(fmi3UpdateDiscreteStates, fmi3Boolean *again, fmi3Boolean *ends, fmi3Boolean *nominals, fmi3Boolean *states,
-        fmi3Boolean *defined, fmi3Float64 *next)
-REFUSED(fmi3CompletedIntegratorStep, fmi3Boolean keeps, fmi3Boolean *event, fmi3Boolean *ends)
-REFUSED(fmi3SetTime, fmi3Float64 time)
-REFUSED(fmi3SetContinuousStates, const fmi3Float64 states[], size_t count)
-REFUSED(fmi3GetContinuousStateDerivatives, fmi3Float64 derivatives[], size_t count)
-REFUSED(fmi3GetEventIndicators, fmi3Float64 indicators[], size_t count)
-REFUSED(fmi3GetContinuousStates, fmi3Float64 states[], size_t count)
-REFUSED(fmi3GetNominalsOfContinuousStates, fmi3Float64 nominals[], size_t count)
-REFUSED(fmi3GetNumberOfEventIndicators, size_t *count)
-REFUSED(fmi3GetNumberOfContinuousStates, size_t *count)
 REFUSED(fmi3ActivateModelPartition, fmi3ValueReference clock, fmi3Float64 time)
-REFUSED_ALONE(fmi3EnterEventMode)
 REFUSED_ALONE(fmi3EnterConfigurationMode)
 REFUSED_ALONE(fmi3ExitConfigurationMode)
 REFUSED_ALONE(fmi3EvaluateDiscreteStates)
-REFUSED_ALONE(fmi3EnterContinuousTimeMode)
 REFUSED_ALONE(fmi3EnterStepMode)

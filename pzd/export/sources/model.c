@@ -11,9 +11,10 @@ static element_inputs inputs_of(const model *m)
     return inputs;
 }
 
-void model_reset(model *m)
+void model_reset(model *m, int exchanged)
 {
     memset(m, 0, sizeof *m);
+    m->exchanged = exchanged;
     m->values[SIGNAL] = START_SIGNAL;
     m->values[TEMPERATURE] = START_TEMPERATURE;
     m->values[ZERO] = START_ZERO;
@@ -23,24 +24,112 @@ void model_start(model *m)
 {
     const element_inputs inputs = inputs_of(m);
     m->state = element_start(&inputs, m->values[INITIAL_FORCE]);
+    m->branched = m->values[DISPLACEMENT];
     m->running = 1;
 }
 
-static double force_of(const model *m)
+/* The model with its start values settled, as they will be. */
+static model begun(const model *m)
 {
     model now = *m;
     if (!now.running)
         model_start(&now);
+    return now;
+}
+
+/* The state now: a solver knows of no branch, whose closed form over the way since the last turn is taken here. */
+static element_state state_of(const model *m)
+{
+    const element_inputs inputs = inputs_of(m);
+    if (!m->exchanged)
+        return m->state;
+    return element_moved(m->state, &inputs, (real)(m->values[DISPLACEMENT] - m->branched));
+}
+
+void model_remember(model *m)
+{
+    m->state = state_of(m);
+    m->branched = m->values[DISPLACEMENT];
+}
+
+static double force_of(const model *m)
+{
+    const model now = begun(m);
     const element_inputs inputs = inputs_of(&now);
-    return element_force(now.state, &inputs);
+    return element_force(state_of(&now), &inputs);
+}
+
+static real *at(element_state *state, int place)
+{
+    return place < DRIVE_RATES ? state->path : state->drive + (place - DRIVE_RATES);
+}
+
+/* Rates [CONTINUOUS] and indicators [INDICATORS]. */
+static void equations(const model *m, double rates[], double indicators[])
+{
+    real every[RATES], signs[INDICATORS];
+    const model now = begun(m);
+    const element_inputs inputs = inputs_of(&now);
+    element_rates(now.state, &inputs, every, signs);
+    for (int i = 0; rates != NULL && i < CONTINUOUS; i++)
+        rates[i] = every[STATE_PLACES[i]];
+    for (int i = 0; indicators != NULL && i < INDICATORS; i++)
+        indicators[i] = signs[i];
+}
+
+void model_states(const model *m, double states[])
+{
+    model now = begun(m);
+    for (int i = 0; i < CONTINUOUS; i++)
+        states[i] = *at(&now.state, STATE_PLACES[i]);
+}
+
+void model_set_states(model *m, const double states[])
+{
+    for (int i = 0; i < CONTINUOUS; i++)
+        *at(&m->state, STATE_PLACES[i]) = (real)states[i];
+}
+
+void model_rates(const model *m, double rates[])
+{
+    equations(m, rates, NULL);
+}
+
+void model_indicators(const model *m, double indicators[])
+{
+    equations(m, NULL, indicators);
+}
+
+void model_nominals(double nominals[])
+{
+    for (int i = 0; i < CONTINUOUS; i++)
+        nominals[i] = STATE_NOMINALS[i];
+}
+
+/* The value of any variable; those from VARIABLES on are computed, as the force is. */
+static double value_of(const model *m, unsigned variable)
+{
+    double found[RATES + INDICATORS];
+    const int solved = (int)variable - VARIABLES;
+    if (solved < 0)
+        return variable == FORCE ? force_of(m) : m->values[variable];
+    if (solved >= 2 * CONTINUOUS) {
+        model_indicators(m, found);
+        return found[solved - 2 * CONTINUOUS];
+    }
+    if (solved % 2 == 0)
+        model_states(m, found);
+    else
+        model_rates(m, found);
+    return found[solved / 2];
 }
 
 const char *model_get(const model *m, const unsigned variables[], size_t count, double values[])
 {
     for (size_t i = 0; i < count; i++) {
-        if (variables[i] >= VARIABLES)
+        if (variables[i] >= VARIABLES + 2 * CONTINUOUS + INDICATORS)
             return "there is no variable of this value reference";
-        values[i] = variables[i] == FORCE ? force_of(m) : m->values[variables[i]];
+        values[i] = value_of(m, variables[i]);
     }
     return NULL;
 }
@@ -85,30 +174,51 @@ const char *model_set_rates(model *m, const unsigned variables[], size_t count, 
     return NULL;
 }
 
-/* Derivative of the force by one input, by a central difference over a millionth of its size. */
-static double slope_of(const model *m, unsigned input)
+static int is_state(unsigned variable)
 {
-    const double usual = input == DISPLACEMENT ? 1e-3 : input == VELOCITY ? 1e-2 : 1.0; /* [m], [m/s] */
-    const double half = 1e-6 * fmax(fabs(m->values[input]), usual);
-    model above = *m, below = *m;
-    above.values[input] += half;
-    below.values[input] -= half;
-    return (force_of(&above) - force_of(&below)) / (2.0 * half);
+    const int solved = (int)variable - VARIABLES;
+    return solved >= 0 && solved < 2 * CONTINUOUS && solved % 2 == 0;
+}
+
+static int is_computed(unsigned variable)
+{
+    return variable == FORCE || is_state(variable - 1); /* a rate stands behind its state */
+}
+
+static void nudge(model *m, unsigned variable, double by)
+{
+    if (is_state(variable))
+        *at(&m->state, STATE_PLACES[(variable - VARIABLES) / 2]) += (real)by;
+    else
+        m->values[variable] += by;
+}
+
+/* Derivative of the force or of a rate by an input or a state, by a central difference over a millionth of its size. */
+static double slope_of(const model *m, unsigned unknown, unsigned known)
+{
+    const double usual = is_state(known)         ? 1e-3 * STATE_NOMINALS[(known - VARIABLES) / 2]
+                         : known == DISPLACEMENT ? 1e-3 /* [m] */
+                         : known == VELOCITY     ? 1e-2 /* [m/s] */
+                                                 : 1.0;
+    model above = begun(m), below = above;
+    const double half = 1e-6 * fmax(fabs(value_of(&above, known)), usual);
+    nudge(&above, known, half);
+    nudge(&below, known, -half);
+    return (value_of(&above, unknown) - value_of(&below, unknown)) / (2.0 * half);
 }
 
 const char *model_derivative(const model *m, const unsigned unknowns[], size_t count, const unsigned knowns[],
                              size_t directions, const double seed[], double found[])
 {
-    double along = 0.0;
-    for (size_t i = 0; i < directions; i++) {
-        if (!is_input(knowns[i]))
-            return "the force has derivatives by inputs alone";
-        along += seed[i] * slope_of(m, knowns[i]);
-    }
     for (size_t i = 0; i < count; i++) {
-        if (unknowns[i] != FORCE)
-            return "the force alone has derivatives";
-        found[i] = along;
+        if (!is_computed(unknowns[i]))
+            return "the force and the rates of the states alone have derivatives";
+        found[i] = 0.0;
+        for (size_t n = 0; n < directions; n++) {
+            if (!is_input(knowns[n]) && !is_state(knowns[n]))
+                return "there are derivatives by inputs and states alone";
+            found[i] += seed[n] * slope_of(m, unknowns[i], knowns[n]);
+        }
     }
     return NULL;
 }

@@ -12,6 +12,8 @@ typedef struct {
     double rates[VARIABLES]; /* of inputs that go linearly over a step; 0 for one that is held */
     double travel;           /* since the displacement was set [m] */
     element_state state;
+    int exchanged;  /* whether a solver integrates it */
+    double branched; /* displacement up to which the branches followed, for a solver alone [m] */
     int running; /* whether the start values are settled */
 } model;
 
@@ -23,6 +25,17 @@ const char *model_derivative(const model *m, const unsigned unknowns[], size_t c
                              size_t directions, const double seed[], double found[]);
 const char *model_step(model *m, double time, double step);
 
+/* For a solver: the continuous states, their rates, and what changes sign where an equation does. Value references from
+ * VARIABLES on are these: each state and its rate in turn, then the indicators. */
+void model_states(const model *m, double states[]);
+void model_set_states(model *m, const double states[]);
+void model_rates(const model *m, double rates[]);
+void model_indicators(const model *m, double indicators[]);
+void model_nominals(double nominals[]);
+
+/* Keeps what the branches remember of the way so far: where a step of the solver is complete, and at an event. */
+void model_remember(model *m);
+
 /* A state is a copy of the whole model, of its size in memory and in bytes; none is made where `*state` is one. */
 const char *model_keep(const model *m, void **state);
 const char *model_write(const void *state, void *bytes, size_t size);
@@ -30,7 +43,7 @@ const char *model_read(const void *bytes, size_t size, void **state);
 
 void model_take(model *m, const void *state);
 void model_free(void **state);
-void model_reset(model *m);
+void model_reset(model *m, int exchanged);
 void model_start(model *m);
 
 #endif
