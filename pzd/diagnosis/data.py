@@ -11,7 +11,7 @@ its sensor. Noise of a constant voltage would look like steps of the voltage.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -21,24 +21,15 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import Rig
 from pzd.record import Array, Record, conditions, distinct, is_constant, sliced, voltage_scale
-from pzd.signals.cycles import Cycles, cycles, drift_over_cycles, settled_cycles
+from pzd.signals.average_cycle import AverageCycle, Motion
+from pzd.signals.cycles import Cycles, cycles, settled_cycles
 from pzd.signals.jumps import denoised_control
-from pzd.signals.lack_of_fit import ShortTimeMask
 from pzd.signals.measures import resolution
-from pzd.signals.noise import neighbouring_harmonics, pure_error
 from pzd.signals.segmentation import separate_tests
-from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
-from pzd.signals.splines import even_cubic
+from pzd.signals.smoothing import HIGHEST, cut_above, low_pass, motion_below, resolved_below
 
-Motion = tuple[Array, Array, Array]
-"""Displacement, velocity and acceleration, each (n,)."""
-
-SIGNIFICANT_HARMONIC = 4.0
-"""Standard errors from which a harmonic of the displacement is kept, over a cycle or in parts of it."""
 DRAWS = 6
 """Displacements that are simulated to see what their noise makes of the force."""
-POINTS_OF_CYCLE = 16
-"""Points per sample of the cleaned cycle."""
 POINTS_OF_DRAW = 4
 """Points per sample of a drawn cycle: fewer, for its deviation is noise."""
 DEGREE = 5
@@ -121,7 +112,7 @@ def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
         smoothed, draws = _smoothed_displacement(record)
         return PreparedRecord(smoothed, None, None, constant, draws)
-    average = AverageCycle.of(record, run)
+    average = AverageCycle.of(record.time, record.displacement, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
         run = settled_cycles(run, record.time, record.force)
@@ -178,118 +169,6 @@ def _with_lead(cleaned: Record, early: Array, motion: Motion) -> Record:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class AverageCycle:
-    """Average cycle of a displacement, harmonic by harmonic."""
-
-    run: Cycles
-    points: int
-    harmonics: NDArray[np.complex128]
-    """(H + 1,) Fourier coefficients [m]."""
-    variance: Array
-    """(H + 1,) variance |.|^2 of the harmonics by noise and resolution [m^2]."""
-    resolved: int
-    """Number of the first harmonics, beyond which there is no more than the steps of the channel add: no motion."""
-
-    @classmethod
-    def of(cls, record: Record, run: Cycles) -> AverageCycle:
-        """Average the cycles of a record, and estimate how well the average is known."""
-        folded = run.fold(record.time, record.displacement)
-        # A mean that walks would end every cycle with a step, which loads the oil spring.
-        creep = drift_over_cycles(folded)
-        error = pure_error(folded - creep + creep.mean())
-        finest = resolution(record.displacement)
-        hidden = finest > 0.0 and error.sample_variance < (0.5 * finest) ** 2
-        if not hidden:
-            return cls(run, error.points, error.mean, error.of_mean, error.mean.size)
-        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size)
-        power = np.abs(error.mean) ** 2
-        power[1:] *= 2.0
-        return cls(run, error.points, error.mean, error.of_mean + by_steps, _resolved(power, finest))
-
-    @cached_property
-    def clear(self) -> NDArray[np.bool_]:
-        """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
-        clear: NDArray[np.bool_] = np.abs(self.harmonics) > SIGNIFICANT_HARMONIC * np.sqrt(self.variance)
-        clear[0] = True
-        clear[self.resolved :] = False
-        return clear
-
-    @cached_property
-    def _in_parts(self) -> tuple[ShortTimeMask, Array]:
-        resolved = np.arange(self.harmonics.size) < self.resolved
-        left = self._cycle(np.where(self.clear | ~resolved, 0.0, self.harmonics))
-        return ShortTimeMask.of(left, self.variance, SIGNIFICANT_HARMONIC)
-
-    @cached_property
-    def clear_harmonics(self) -> NDArray[np.complex128]:
-        """(H + 1,) harmonics that stand clear, over the whole cycle or in parts of it [m]."""
-        return np.where(self.clear, self.harmonics, self._spectrum(self._in_parts[1]))
-
-    def _noise(self, draw: np.random.Generator) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """Draw (H + 1,) noise, and return it with what `clear_harmonics` would keep of it."""
-        size = self.harmonics.size
-        unit = draw.standard_normal(size) + 1j * draw.standard_normal(size)
-        noise: NDArray[np.complex128] = np.sqrt(0.5 * self.variance) * unit
-        in_parts = self._spectrum(self._in_parts[0].kept(self._cycle(noise * ~self.clear)))
-        return noise, np.where(self.clear, noise, in_parts)
-
-    @cached_property
-    def left_out(self) -> Array:
-        """(H + 1,) power of the motion in what is not kept: that of neighbouring harmonics above noise."""
-        drawn = [self._noise(draw) for draw in np.random.default_rng(DRAWS).spawn(DRAWS)]
-        noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
-        above = np.where(self.clear, 0.0, np.abs(self.harmonics - self.clear_harmonics) ** 2 - noise)
-        low, high = neighbouring_harmonics(above.size - 1)
-        sums, counts = (np.concatenate([[0.0], np.cumsum(each)]) for each in (above, ~self.clear))
-        mean = (sums[high + 1] - sums[low]) / np.maximum(counts[high + 1] - counts[low], 1.0)
-        return np.asarray(np.where(self.clear, 0.0, np.maximum(mean, 0.0)))
-
-    def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
-        """Draw (H + 1,) an error of `clear_harmonics`: noise in what is kept, and what is left out."""
-        _, found = self._noise(draw)
-        size = found.size
-        found += np.sqrt(0.5 * self.left_out) * (draw.standard_normal(size) + 1j * draw.standard_normal(size))
-        found[0] = 0.0
-        return found
-
-    def _cycle(self, harmonics: NDArray[np.complex128]) -> Array:
-        """Return the (points,) cycle of some harmonics (H + 1,)."""
-        return np.asarray(np.fft.irfft(harmonics, self.points) * self.points)
-
-    def _spectrum(self, cycle: Array) -> NDArray[np.complex128]:
-        """Return the (H + 1,) harmonics of a cycle (points,)."""
-        return np.asarray(np.fft.rfft(cycle)[: self.harmonics.size] / self.points)
-
-    def motion(self, harmonics: NDArray[np.complex128], finer: int = POINTS_OF_CYCLE) -> Callable[[Array], Motion]:
-        """Return displacement, velocity and acceleration of some harmonics (H + 1,) as a function of time."""
-        rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
-        fine = finer * self.points
-        values = np.fft.irfft(harmonics * rate ** np.arange(3)[:, None], fine) * fine
-        cycle = even_cubic(values.T, periodic=True)
-
-        def at(time: Array) -> Motion:
-            x, v, a = np.ascontiguousarray(cycle(fine * self.run.phase(time)).T)
-            return x, v, a
-
-        return at
-
-
-def variance_by_steps(cycle: Array, step: float, harmonics: int) -> Array:
-    """Compute the variance |.|^2 of the harmonics (H + 1,) of a cycle (points,) by the steps of its channel [m^2].
-
-    The error is a sawtooth in the displacement. It fills the harmonics up to the fastest of its teeth: all where a step
-    takes less than two samples, else as many fewer.
-
-    Equation: (q^2 / 12) / min(n, 2 h), h = max abs(dx/dphase) / q teeth a cycle; n samples
-                                                                    Source: Bennett 1948, Bell Syst. Tech. J. 27
-    """
-    teeth = float(np.max(np.abs(np.gradient(cycle)))) * cycle.size / step
-    density = np.full(harmonics, 1.0 / cycle.size)
-    density[: int(np.ceil(teeth)) + 1] = 1.0 / min(cycle.size, max(2.0 * teeth, 1.0))
-    return density * (step**2 / 12.0)
-
-
 def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, ...]:
     """Return two cycles of the lead, and the same with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
@@ -305,8 +184,8 @@ def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:
     motion stands out of its noise everywhere.
     """
     step = resolution(record.displacement)
-    corner = min(motion_below(record.displacement), _resolved_below(record.displacement))
-    smooth, beyond = _low_passed(record.displacement, corner)
+    corner = min(motion_below(record.displacement), resolved_below(record.displacement, step))
+    smooth, beyond = cut_above(record.displacement, corner)
     smoothed = _with_motion(record, _derivatives(smooth, record.rate))
     if beyond == 0.0:
         return smoothed, ()
@@ -318,49 +197,9 @@ def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:
         if step > 0.0:
             zero = step * draw.uniform(-0.5, 0.5)
             seen = step * np.round((seen - zero) / step) + zero
-        return _derivatives(_low_passed(seen, corner)[0], record.rate)
+        return _derivatives(cut_above(seen, corner)[0], record.rate)
 
     return smoothed, (smoothed, *(_with_motion(record, other()) for _ in range(DRAWS)))
-
-
-def _resolved_below(displacement: Array) -> float:
-    """Return the frequency above which a displacement (n,) holds no more than its steps add [rad/sample]."""
-    odd, _ = _reflected_odd(displacement)
-    power = np.abs(np.fft.rfft(odd)) ** 2 * (2.0 / odd.size**2)
-    return min(_resolved(power, resolution(displacement)) * (2.0 * np.pi / odd.size), np.pi)
-
-
-def _resolved(power: Array, step: float) -> int:
-    """Return the number of the first lines (h,) of a spectrum [m^2] beyond which there is no more than steps [m] add.
-
-    Where a step takes several samples, or the samples meet it at the same places in each cycle, its error is no white
-    noise, and its lines would count as motion.
-
-    Equation: the least h with sum_(>= h) p_h <= q^2 / 12        Source: Morozov 1966, discrepancy principle
-    """
-    beyond = np.cumsum(power[::-1])[::-1]
-    return int(np.searchsorted(-beyond, -(step**2) / 12.0))
-
-
-def _reflected_odd(displacement: Array) -> tuple[Array, Array]:
-    """Return a displacement (n,) less the line through its ends, continued by its point reflection, and the line."""
-    line = np.linspace(displacement[0], displacement[-1], displacement.size)
-    odd = displacement - line
-    return np.concatenate([odd, -odd[:0:-1]]), line
-
-
-def _low_passed(displacement: Array, corner: float) -> tuple[Array, float]:
-    """Return a displacement (n,) without what is above a corner [rad/sample], and its noise [m].
-
-    The noise is that of the octave above the corner, where what the motion loses is counted with it.
-    """
-    odd, line = _reflected_odd(displacement)
-    spectrum = np.fft.rfft(odd)
-    frequency = np.arange(spectrum.size) * (2.0 * np.pi / odd.size)
-    octave = spectrum[(frequency > corner) & (frequency <= 2.0 * corner)]
-    spectrum[frequency > corner] = 0.0
-    noise = float(np.sqrt(np.mean(np.abs(octave) ** 2) / odd.size)) if octave.size else 0.0
-    return np.fft.irfft(spectrum, odd.size)[: line.size] + line, noise
 
 
 def _derivatives(smooth: Array, rate: float) -> Motion:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pzd.record import Array, Record
 from pzd.signals.harmonics import MAINS
-from pzd.signals.measures import usual_step
+from pzd.signals.measures import resolution, usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
 from pzd.signals.smoothing import HIGHEST, low_pass
 from pzd.signals.splines import cubic
@@ -129,7 +129,7 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
     else:
         folded, ends = _smoothed(run, time, displacement)
     folded = _without_hum(folded - drift_over_cycles(folded), run.period)[:, ends : folded.shape[1] - ends]
-    return None if departure_from_mean_cycle(folded) > LARGEST_DEPARTURE else run
+    return None if departure_from_mean_cycle(folded, resolution(displacement)) > LARGEST_DEPARTURE else run
 
 
 _cycles_by_record: WeakKeyDictionary[Record, Cycles | None] = WeakKeyDictionary()
@@ -424,15 +424,17 @@ INDEPENDENT_SAMPLES = 20
 """Fewest independent samples in a cycle of coloured noise."""
 
 
-def departure_from_mean_cycle(folded: Array) -> float:
+def departure_from_mean_cycle(folded: Array, step: float = 0.0) -> float:
     """Compute the share of a motion beyond noise that an average over its cycles removes.
 
-    Equation: P - min_l D_l / 2 with P = n / (n - 1) mean (x_j - mean x)^2, D_l = mean (x_(j+l) - x_j)^2
-              Source: von Neumann 1941; noise that no cycle shares with another has P = D_l / 2 at every l
+    Equation: P - min_l D_l / 2 - q^2 / 12 with P = n / (n - 1) mean (x_j - mean x)^2, D_l = mean (x_(j+l) - x_j)^2
+              Source: von Neumann 1941; noise that no cycle shares with another has P = D_l / 2 at every l;
+              Bennett 1948 for steps q, which some neighbours meet alike
 
     Parameters
     ----------
     folded : (n, points) displacement, one row a cycle, slow drift taken off; smoothed where n < ENOUGH_CYCLES
+    step : of the channel, in its unit
 
     Returns
     -------
@@ -440,17 +442,25 @@ def departure_from_mean_cycle(folded: Array) -> float:
     within the noise
     """
     points = folded.shape[1]
-    steps = [points // part for part in CYCLE_PARTS if points >= 2 * part]
-    return max(_excess_scatter(of) for of in (folded, *(folded[:, step:] - folded[:, :-step] for step in steps)))
+    lengths = [points // part for part in CYCLE_PARTS if points >= 2 * part]
+    rounding = step**2 / 12.0
+    changes = (_excess_scatter(folded[:, apart:] - folded[:, :-apart], 2.0 * rounding) for apart in lengths)
+    return max(_excess_scatter(folded, rounding), *changes)
 
 
-def _excess_scatter(cycles: Array) -> float:
-    """Return the scatter of cycles (n, points) about their mean beyond noise, in r.m.s. as a share of the motion."""
+def _excess_scatter(cycles: Array, rounding: float) -> float:
+    """Return the scatter of cycles (n, points) about their mean beyond noise, in r.m.s. as a share of the motion.
+
+    Parameters
+    ----------
+    cycles : (n, points)
+    rounding : variance by the steps of the channel
+    """
     count = len(cycles)
     scatter = float(np.mean((cycles - cycles.mean(axis=0)) ** 2)) * count / (count - 1)
     lags = range(1, min(NEIGHBOURING_CYCLES, count - 1) + 1) if count >= ENOUGH_CYCLES else ()
     noise = min((0.5 * float(np.mean((cycles[lag:] - cycles[:-lag]) ** 2)) for lag in lags), default=0.0)
-    excess = scatter - noise
+    excess = scatter - noise - rounding
     if excess <= SIGNIFICANT_ERRORS * noise * np.sqrt(3.0 / (count * INDEPENDENT_SAMPLES)):
         return 0.0
     return float(np.sqrt(excess / np.mean((cycles - cycles.mean()) ** 2)))

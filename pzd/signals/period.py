@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.signals.measures import usual_step
-from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.measures import resolution, usual_step
+from pzd.signals.smoothing import HIGHEST, low_pass, without_steps
 
 MOST_SAMPLES = 2**18
 """Most samples in the search; longer records are thinned. An FFT of so many takes a few hundredths of a second."""
@@ -71,7 +71,7 @@ def periodic_section(time: Array, displacement: Array) -> PeriodicSection | None
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
-    smooth = low_pass(x, HIGHEST)
+    smooth = low_pass(without_steps(x, resolution(displacement)), HIGHEST)  # the speed of a step is no motion
     # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
     outer = int(RAMPS * (last - first) * usual_step(time) / step)
     inner = x[int((time[first] - time[0]) / step) + outer : int((time[last] - time[0]) / step) - outer]

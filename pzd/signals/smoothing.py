@@ -58,6 +58,57 @@ def motion_below(values: Array) -> float:
     return min(_corner(s, np.abs(spectrum) ** 2, HIGHEST), float(np.pi))
 
 
+# --- Steps ---
+#
+# Where a step takes several samples, or the samples meet it at the same places in each cycle, its error is no white
+# noise, and its lines would count as motion.
+
+
+def without_steps(values: Array, step: float) -> Array:
+    """Return a channel (n,) on a regular grid without the lines that hold no more than its steps add."""
+    return cut_above(values, resolved_below(values, step))[0] if step > 0.0 else values
+
+
+def resolved_below(values: Array, step: float) -> float:
+    """Return the frequency above which a channel (n,) holds no more than its steps add [rad/sample]."""
+    odd, _ = _reflected_odd(values)
+    power = np.abs(np.fft.rfft(odd)) ** 2 * (2.0 / odd.size**2)
+    return min(resolved_lines(power, step) * (2.0 * np.pi / odd.size), np.pi)
+
+
+def resolved_lines(power: Array, step: float) -> int:
+    """Return the number of the first lines (h,) of a spectrum [m^2] beyond which there is no more than steps [m] add.
+
+    Equation: the least h with sum_(>= h) p_h <= q^2 / 12        Source: Morozov 1966, discrepancy principle
+    """
+    beyond = np.cumsum(power[::-1])[::-1]
+    return int(np.searchsorted(-beyond, -(step**2) / 12.0))
+
+
+def _reflected_odd(displacement: Array) -> tuple[Array, Array]:
+    """Return a displacement (n,) less the line through its ends, continued by its point reflection, and the line."""
+    line = np.linspace(displacement[0], displacement[-1], displacement.size)
+    odd = displacement - line
+    return np.concatenate([odd, -odd[:0:-1]]), line
+
+
+def cut_above(displacement: Array, corner: float) -> tuple[Array, float]:
+    """Return a displacement (n,) without what is above a corner [rad/sample], and its noise [m].
+
+    The noise is that of the octave above the corner, where what the motion loses is counted with it.
+    """
+    odd, line = _reflected_odd(displacement)
+    spectrum = np.fft.rfft(odd)
+    frequency = np.arange(spectrum.size) * (2.0 * np.pi / odd.size)
+    octave = spectrum[(frequency > corner) & (frequency <= 2.0 * corner)]
+    spectrum[frequency > corner] = 0.0
+    noise = float(np.sqrt(np.mean(np.abs(octave) ** 2) / odd.size)) if octave.size else 0.0
+    return np.fft.irfft(spectrum, odd.size)[: line.size] + line, noise
+
+
+# --- Corner by cross-validation ---
+
+
 def _reflected(values: Array) -> tuple[Array, Complex, Array]:
     """Return the line (m,) through both ends, the spectrum (m,) of the reflected rest, and 2 sin(w/2) (m,); m >= n."""
     values = _of_fast_length(values)

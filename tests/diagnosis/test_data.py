@@ -15,7 +15,7 @@ from pzd.blind.independent.stand import Actuator, LaboratoryCampaign, Laboratory
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split, variance_by_steps
+from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split
 from pzd.diagnosis.fit.prediction import predict, predicted_force
 from pzd.diagnosis.gap import check_residual, visible_gap
 from pzd.record import Array, Record
@@ -162,20 +162,6 @@ def test_the_error_of_a_sweep_is_as_large_as_that_of_the_others_drawn(
     drawn = np.mean([np.std((each.velocity - kept.velocity)[inside]) for each in others])
     assert own < 0.02 * np.max(true)
     assert 0.3 < own / drawn < 3.0
-
-
-@pytest.mark.parametrize("points", [2000, 400, 80])
-def test_the_steps_of_a_channel_fill_the_harmonics_up_to_their_teeth(points: int, rng: Generator) -> None:
-    """Of 40 steps a stroke: all the power of the error is in 2 pi 20 = 126 harmonics, and little beyond."""
-    step, phase = 1e-3, 2.0 * np.pi * np.arange(points) / points
-    whole = np.zeros(points // 2 + 1)
-    for offset in rng.uniform(-0.5, 0.5, 200) * step:
-        x = 20.0 * step * np.sin(phase + 1e3 * offset) + offset
-        whole += np.abs(np.fft.rfft(np.round(x / step) * step - x) / points) ** 2 / 200.0
-    given = variance_by_steps(20.0 * step * np.sin(phase), step, whole.size)
-    low = slice(1, min(126, points // 2))
-    assert np.mean(whole[low]) == pytest.approx(np.mean(given[low]), rel=0.4)
-    assert np.sum(whole) < 1.1 * np.sum(given)
 
 
 # --- What noise of the displacement makes of the force: no gap, whatever the motion

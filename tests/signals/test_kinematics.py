@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pzd.signals.cycles import cycles
-from pzd.signals.kinematics import kinematics, significant_harmonics
+from pzd.signals.kinematics import kinematics
 
 Array = NDArray[np.float64]
 
@@ -97,14 +97,3 @@ def test_an_uneven_clock_gives_the_same_velocity(rng: np.random.Generator) -> No
     x = 0.01 * np.sin(OMEGA * time)
     clean = kinematics(time, x, cycles(time, x))
     assert relative(clean.velocity, 0.01 * OMEGA * np.cos(OMEGA * time)) < 0.01
-
-
-def test_harmonics_that_do_not_exceed_their_scatter_are_dropped(rng: np.random.Generator) -> None:
-    phase = 2.0 * np.pi * np.arange(200) / 200.0
-    cycle = np.sin(phase) + 0.01 * np.sin(7.0 * phase)
-    false = 0
-    for _ in range(20):
-        kept = significant_harmonics(cycle + 0.01 * rng.standard_normal((20, 200)))
-        assert kept[[0, 1, 7]].all()
-        false += int(kept.sum()) - 3
-    assert false <= 20

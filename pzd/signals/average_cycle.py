@@ -1,0 +1,146 @@
+"""Average cycle of a displacement, without its noise and its steps: no filter of fixed corner.
+
+Noise of the displacement goes through a stiff oil into the force, and its second derivative looks like inertia. Where
+the motion repeats, cycles are averaged, and only harmonics well above their own scatter are kept, over the whole cycle
+or in short parts of it, such as the corners of a triangle. Steps that each cycle meets alike do not scatter: harmonics
+beyond which there is no more than the steps add are no motion either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.record import Array
+from pzd.signals.cycles import Cycles, drift_over_cycles
+from pzd.signals.lack_of_fit import ShortTimeMask
+from pzd.signals.measures import resolution
+from pzd.signals.noise import neighbouring_harmonics, pure_error
+from pzd.signals.smoothing import resolved_lines
+from pzd.signals.splines import even_cubic
+
+Motion = tuple[Array, Array, Array]
+"""Displacement, velocity and acceleration, each (n,)."""
+
+SIGNIFICANT_HARMONIC = 4.0
+"""Standard errors from which a harmonic of the displacement is kept, over a cycle or in parts of it."""
+POINTS_OF_CYCLE = 16
+"""Points per sample of the cleaned cycle."""
+LEFT_OUT_DRAWS = 6
+"""Draws of the noise by which the power of the motion in what is left out is told from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class AverageCycle:
+    """Average cycle of a displacement, harmonic by harmonic."""
+
+    run: Cycles
+    points: int
+    harmonics: NDArray[np.complex128]
+    """(H + 1,) Fourier coefficients [m]."""
+    variance: Array
+    """(H + 1,) variance |.|^2 of the harmonics by noise and resolution [m^2]."""
+    resolved: int
+    """Number of the first harmonics, beyond which there is no more than the steps of the channel add: no motion."""
+
+    @classmethod
+    def of(cls, time: Array, displacement: Array, run: Cycles) -> AverageCycle:
+        """Average the cycles of a displacement (n,) [m] over time (n,) [s], and estimate how well that is known."""
+        folded = run.fold(time, displacement)
+        # A mean that walks would end every cycle with a step, which loads the oil spring.
+        creep = drift_over_cycles(folded)
+        error = pure_error(folded - creep + creep.mean())
+        finest = resolution(displacement)
+        hidden = finest > 0.0 and error.sample_variance < (0.5 * finest) ** 2
+        if not hidden:
+            return cls(run, error.points, error.mean, error.of_mean, error.mean.size)
+        by_steps = variance_by_steps(folded.mean(axis=0), finest, error.mean.size)
+        power = np.abs(error.mean) ** 2
+        power[1:] *= 2.0
+        return cls(run, error.points, error.mean, error.of_mean + by_steps, resolved_lines(power, finest))
+
+    @cached_property
+    def clear(self) -> NDArray[np.bool_]:
+        """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
+        clear: NDArray[np.bool_] = np.abs(self.harmonics) > SIGNIFICANT_HARMONIC * np.sqrt(self.variance)
+        clear[0] = True
+        clear[self.resolved :] = False
+        return clear
+
+    @cached_property
+    def _in_parts(self) -> tuple[ShortTimeMask, Array]:
+        resolved = np.arange(self.harmonics.size) < self.resolved
+        left = self._cycle(np.where(self.clear | ~resolved, 0.0, self.harmonics))
+        return ShortTimeMask.of(left, self.variance, SIGNIFICANT_HARMONIC)
+
+    @cached_property
+    def clear_harmonics(self) -> NDArray[np.complex128]:
+        """(H + 1,) harmonics that stand clear, over the whole cycle or in parts of it [m]."""
+        return np.where(self.clear, self.harmonics, self._spectrum(self._in_parts[1]))
+
+    def _noise(self, draw: np.random.Generator) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Draw (H + 1,) noise, and return it with what `clear_harmonics` would keep of it."""
+        size = self.harmonics.size
+        unit = draw.standard_normal(size) + 1j * draw.standard_normal(size)
+        noise: NDArray[np.complex128] = np.sqrt(0.5 * self.variance) * unit
+        in_parts = self._spectrum(self._in_parts[0].kept(self._cycle(noise * ~self.clear)))
+        return noise, np.where(self.clear, noise, in_parts)
+
+    @cached_property
+    def left_out(self) -> Array:
+        """(H + 1,) power of the motion in what is not kept: that of neighbouring harmonics above noise."""
+        drawn = [self._noise(draw) for draw in np.random.default_rng(LEFT_OUT_DRAWS).spawn(LEFT_OUT_DRAWS)]
+        noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
+        above = np.where(self.clear, 0.0, np.abs(self.harmonics - self.clear_harmonics) ** 2 - noise)
+        low, high = neighbouring_harmonics(above.size - 1)
+        sums, counts = (np.concatenate([[0.0], np.cumsum(each)]) for each in (above, ~self.clear))
+        mean = (sums[high + 1] - sums[low]) / np.maximum(counts[high + 1] - counts[low], 1.0)
+        return np.asarray(np.where(self.clear, 0.0, np.maximum(mean, 0.0)))
+
+    def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
+        """Draw (H + 1,) an error of `clear_harmonics`: noise in what is kept, and what is left out."""
+        _, found = self._noise(draw)
+        size = found.size
+        found += np.sqrt(0.5 * self.left_out) * (draw.standard_normal(size) + 1j * draw.standard_normal(size))
+        found[0] = 0.0
+        return found
+
+    def _cycle(self, harmonics: NDArray[np.complex128]) -> Array:
+        """Return the (points,) cycle of some harmonics (H + 1,)."""
+        return np.asarray(np.fft.irfft(harmonics, self.points) * self.points)
+
+    def _spectrum(self, cycle: Array) -> NDArray[np.complex128]:
+        """Return the (H + 1,) harmonics of a cycle (points,)."""
+        return np.asarray(np.fft.rfft(cycle)[: self.harmonics.size] / self.points)
+
+    def motion(self, harmonics: NDArray[np.complex128], finer: int = POINTS_OF_CYCLE) -> Callable[[Array], Motion]:
+        """Return displacement, velocity and acceleration of some harmonics (H + 1,) as a function of time."""
+        rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
+        fine = finer * self.points
+        values = np.fft.irfft(harmonics * rate ** np.arange(3)[:, None], fine) * fine
+        cycle = even_cubic(values.T, periodic=True)
+
+        def at(time: Array) -> Motion:
+            x, v, a = np.ascontiguousarray(cycle(fine * self.run.phase(time)).T)
+            return x, v, a
+
+        return at
+
+
+def variance_by_steps(cycle: Array, step: float, harmonics: int) -> Array:
+    """Compute the variance |.|^2 of the harmonics (H + 1,) of a cycle (points,) by the steps of its channel [m^2].
+
+    The error is a sawtooth in the displacement. It fills the harmonics up to the fastest of its teeth: all where a step
+    takes less than two samples, else as many fewer.
+
+    Equation: (q^2 / 12) / min(n, 2 h), h = max abs(dx/dphase) / q teeth a cycle; n samples
+                                                                    Source: Bennett 1948, Bell Syst. Tech. J. 27
+    """
+    teeth = float(np.max(np.abs(np.gradient(cycle)))) * cycle.size / step
+    density = np.full(harmonics, 1.0 / cycle.size)
+    density[: int(np.ceil(teeth)) + 1] = 1.0 / min(cycle.size, max(2.0 * teeth, 1.0))
+    return density * (step**2 / 12.0)

@@ -1,0 +1,46 @@
+"""The average cycle of a displacement, without its noise and its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from pzd.signals.average_cycle import AverageCycle, variance_by_steps
+from pzd.signals.cycles import Cycles
+
+
+@pytest.mark.parametrize("points", [2000, 400, 80])
+def test_the_steps_of_a_channel_fill_the_harmonics_up_to_their_teeth(points: int, rng: Generator) -> None:
+    """Of 40 steps a stroke: all the power of the error is in 2 pi 20 = 126 harmonics, and little beyond."""
+    step, phase = 1e-3, 2.0 * np.pi * np.arange(points) / points
+    whole = np.zeros(points // 2 + 1)
+    for offset in rng.uniform(-0.5, 0.5, 200) * step:
+        x = 20.0 * step * np.sin(phase + 1e3 * offset) + offset
+        whole += np.abs(np.fft.rfft(np.round(x / step) * step - x) / points) ** 2 / 200.0
+    given = variance_by_steps(20.0 * step * np.sin(phase), step, whole.size)
+    low = slice(1, min(126, points // 2))
+    assert np.mean(whole[low]) == pytest.approx(np.mean(given[low]), rel=0.4)
+    assert np.sum(whole) < 1.1 * np.sum(given)
+
+
+def test_harmonics_that_do_not_exceed_their_scatter_are_dropped(rng: Generator) -> None:
+    time = np.arange(4000) / 200.0
+    cycle = np.sin(2.0 * np.pi * time) + 0.01 * np.sin(7.0 * 2.0 * np.pi * time)
+    false = 0
+    for _ in range(20):
+        seen = cycle + 0.01 * rng.standard_normal(time.size)
+        kept = AverageCycle.of(time, seen, Cycles(1.0, 0.0, 20)).clear
+        assert kept[[0, 1, 7]].all()
+        false += int(kept.sum()) - 3
+    assert false <= 20
+
+
+@pytest.mark.parametrize("samples", [1000, 977])
+def test_steps_that_each_cycle_meets_alike_are_no_motion(samples: int) -> None:
+    """They do not scatter at all; a hundred steps a stroke, and a speed to a thousandth of its peak."""
+    time = np.arange(8 * samples) / samples
+    x, v = np.sin(2.0 * np.pi * time + 0.3), 2.0 * np.pi * np.cos(2.0 * np.pi * time + 0.3)
+    seen = 0.02 * np.round(x / 0.02)
+    average = AverageCycle.of(time, seen, Cycles(1.0, 0.0, 8))
+    assert np.max(np.abs(average.motion(average.clear_harmonics)(time)[1] - v)) < 1e-3 * np.max(v)
