@@ -107,6 +107,36 @@ def test_a_damper_of_a_run_rides_with_its_own_dynamics_at_the_axle_it_is_given(
     assert "dynamic" not in {row["fidelity"] for row in summary("mixed")}
 
 
+def test_a_run_that_is_made_anew_makes_the_rides_stale_and_half_of_it_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Where the other run was diagnosed anew, its old table belongs to another damper: neither is ridden."""
+    rig = (
+        "car: false\nrig:\n  virtual:\n    - damper: {{base: [{{T0_N: {T0}, C_Ns_per_m: 1500, k_N_per_m: 300000}}]}}\n"
+        "      tests:\n"
+        "        - {{waveform: {{kind: sine, frequency_Hz: 1, amplitude_m: 0.02}}, duration_s: 4}}\n"
+        "        - {{waveform: {{kind: sine, frequency_Hz: 4, amplitude_m: 0.01}}, duration_s: 2}}\n"
+    )
+    Path("rig.yaml").write_text(rig.format(T0=200), encoding="utf-8")
+    assert status(["run", "rig.yaml", "-q"]) in (0, 4)
+    assert run_of("damper: {run: runs/rig}\n", "again", {}) in (0, 4)
+    before = summary("again")
+    Path("rig.yaml").write_text(rig.format(T0=300), encoding="utf-8")
+    assert status(["diagnose", "rig.yaml", "-q"]) in (0, 4)
+    capsys.readouterr()
+    assert status(["show", "again.yaml"]) == 0
+    told = capsys.readouterr().out
+    assert "stale: table: " in told
+    assert "stale: simulate: it is made from table" in told
+    assert status(["run", "again.yaml", "-q"]) == 2
+    said = capsys.readouterr().err
+    assert "its damper is not the one that its table was made of; run pzd table rig.yaml there" in said
+    assert summary("again") == before
+    assert status(["table", "rig.yaml", "-q"]) in (0, 4)
+    assert status(["run", "again.yaml", "-q"]) in (0, 4)
+    assert summary("again") != before
+
+
 def test_exports_hold_the_table_of_each_axle_and_no_dynamics(capsys: pytest.CaptureFixture[str]) -> None:
     both = "damper:\n  front: {curve: a.csv, sign: 1}\n  rear: {curve: b.csv, sign: 1}\ncar: false\n"
     for file, content in (("a.csv", CURVE), ("b.csv", STRAIGHT)):

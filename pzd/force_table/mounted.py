@@ -17,7 +17,7 @@ from pzd.schema.yamlfile import read_yaml
 
 log = logging.getLogger(__name__)
 
-_CONFIG, _MANIFEST = "config.yaml", "manifest.json"
+_CONFIG, _MANIFEST, _LAW = "config.yaml", "manifest.json", "damper.yaml"
 """Files of a run."""
 
 
@@ -89,14 +89,22 @@ def _of_run(asked: OneDamper, place: str, control: Control, folder: Path) -> Mou
     marks = (*manifest.marks, *_edited(run / Table.folder, manifest))
     law = run / Diagnosed.folder
     diagnosed = (law / _MANIFEST).is_file() and not (run / Table.folder / NOTES).is_file()
+    if diagnosed and manifest.inputs.get(f"{law.name}/{_LAW}") != _digest(law / _LAW):
+        raise ConfigError(
+            f"{place}.run: its damper is not the one that its table was made of; run pzd table "
+            f"{Path(manifest.config).name} there, then this again (got {asked.run!r})"
+        )
     damper = Diagnosed.read(law, control).damper if diagnosed else None
     notes = MountedNotes(source=asked.run or "", read=("damper and table as they stand in this run",), marks=marks)
     return MountedDamper(Table.read(run / Table.folder, control), notes, damper)
 
 
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 def _edited(folder: Path, manifest: Manifest) -> tuple[str, ...]:
     """Return a mark where files of a table are not as they were written: its law, where it has one, is another then."""
     files = {name: folder / name for name in manifest.outputs if (folder / name).is_file()}
-    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
-    edited = [f"{folder.name}/{name}" for name, digest in digests.items() if digest != manifest.outputs[name]]
+    edited = [f"{folder.name}/{name}" for name, path in files.items() if _digest(path) != manifest.outputs[name]]
     return (f"{', '.join(edited)} edited by hand",) if edited else ()
