@@ -141,9 +141,9 @@ class Search:
             for i, p in enumerate(promising)
             if i < FITTED or p.candidate.name in ELEMENT_COLUMNS or p.candidate.of == "stand"
         ]
-        # What leaves more of the force than its absence only fits where the scatter is thought to be small.
-        limit = self.left(before)
-        fits = [f for f in (self._with(before, p) for p in worth) if self._admissible(f) and self.left(f) < limit]
+        # What leaves more of the force than its absence, the tests taken to differ alike, does not explain it.
+        tried = (self._with(before, p) for p in worth)
+        fits = [f for f in tried if self._admissible(f) and self.left(f) < self.left(before, f.scatter)]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
@@ -186,9 +186,12 @@ class Search:
         """Whether a fit leaves no more than the best one may leave in its direction."""
         return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden)
 
-    def left(self, fitted: Fitted) -> float:
-        """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks)."""
-        own = self.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
+    def left(self, fitted: Fitted, scatter: Scatter | None = None) -> float:
+        """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks).
+
+        The scatter is that of the fit, where no other one is given.
+        """
+        own = self.regression.likelihood.own_of_tests(fitted.residuals, scatter or fitted.scatter)
         squares = [
             max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
