@@ -191,7 +191,7 @@ def mains_harmonics(cycle: float, last: int, resolution: float) -> Mask:
     """
     orders = np.arange(last + 1) * cycle
     lines = ((h * mains, h * MAINS_TOLERANCE + resolution) for h in MAINS_ORDERS for mains in MAINS)
-    return np.any([np.abs(orders - line) <= wide for line, wide in lines], axis=0)
+    return np.asarray(np.any([np.abs(orders - line) <= wide for line, wide in lines], axis=0))
 
 
 def _waves(frequency: float, time: Array) -> Array:

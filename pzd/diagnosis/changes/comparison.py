@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
@@ -63,8 +63,6 @@ STAND_TESTS = {
     "recorder_delay": "sine, a steel spring in the place of the damper",
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
-PROBE = 0.01
-"""Change of T0, C and k of the first state [share, logarithm] by which it is told how a result depends on them."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
@@ -277,8 +275,12 @@ class Findings:
         verdict: Verdict = "changed" if of_damper else "unchanged"
         if rivals:
             verdict = "ambiguous"
+        told = list(dict.fromkeys(name for names in others.values() for name in names))
         if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
+            # Beside what has no name a change that has rivals is not supported by itself.
             verdict = "unexplained"
+            told = list(dict.fromkeys([*(c.name for c in reported if c.name in rivals), *told]))
+            reported = [change for change in reported if change.name not in rivals]
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
@@ -290,7 +292,7 @@ class Findings:
             difference=difference,
             changes=tuple(listed),
             unchanged=self._unchanged(best),
-            rivals=tuple(dict.fromkeys(name for names in others.values() for name in names)),
+            rivals=tuple(told),
             reason=self._reason(verdict, listed, others, difference),
             next_test=self._next_test(best, rivals),
         )
@@ -400,9 +402,7 @@ class Findings:
         covariance = self.search.regression.covariance(best)
         # A model that misses a share of the force knows how the force follows a parameter to that share.
         missed = self.search.regression.likelihood.known_discrepancy * best.values
-        errors = np.sqrt(
-            np.maximum(np.diag(covariance), 0.0) + missed**2 + self._by_first_state(best) + self._unnamed(best) ** 2
-        )
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + self._unnamed(best) ** 2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -417,39 +417,6 @@ class Findings:
                 found.append(self._change(mine, share))
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
-
-    def _by_first_state(self, best: Fitted) -> Array:
-        """Return the (p,) variance of the coordinates by T0, C and k of the first state, which are known so far.
-
-        What the damper of the first state misses stands at right angles to what its parameters can follow. As much
-        again may lie along it and be in their values, evenly in each of them.
-
-        Equation: S (T' T p / g^2 + 1)^-1 S', T = dR/dtheta, S = - (J' J)^-1 J' dD/dtheta     Source: linear propagation
-        """
-        regression, g = self.search.regression, self.search.regression.likelihood.known_discrepancy
-        own_parameters = {c.name: c for c in self.search.candidates if c.name in ELEMENT_COLUMNS}
-        parts = [c for candidate in own_parameters.values() for c in candidate.coordinates]
-        shares, moved = [], []
-        for c in parts:
-            other = Response(replace(self.first, damper=self.first.changed([c], [PROBE], None)), self.comparisons)
-            own = regression.response.of([c], [PROBE])
-            there = other.of(best.coordinates, best.values.tolist())
-            shares.append([a / PROBE / force for a, force in zip(own, self._forces, strict=True)])
-            moved.append([(a - b - d) / PROBE for a, b, d in zip(there, own, best.differences, strict=True)])
-        T = np.column_stack([np.concatenate(each) for each in shares])
-        theta = np.linalg.inv(T.T @ T * len(parts) / (len(self.comparisons) * max(g, 1e-6) ** 2) + np.eye(len(parts)))
-        whiteners = regression.likelihood.whiteners(best.scatter)
-        J = regression.jacobian(best.coordinates, best.values, whiteners)
-        made = np.column_stack(
-            [np.concatenate([W @ own for W, own in zip(whiteners, each, strict=True)]) for each in moved]
-        )
-        S = np.linalg.lstsq(J, made, rcond=1e-10)[0]
-        return np.asarray(np.diag(S @ theta @ S.T))
-
-    @property
-    def _forces(self) -> list[float]:
-        """R.m.s. force of the first state in every comparison [N]."""
-        return [float(np.linalg.norm(stacked(c.reference))) for c in self.comparisons]
 
     def _unnamed(self, best: Fitted) -> Array:
         """Return the (p,) standard error of the coordinates by what is left: the whole of it may be theirs."""
