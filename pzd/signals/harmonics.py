@@ -180,6 +180,20 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     return wave
 
 
+def mains_harmonics(cycle: float, last: int, resolution: float) -> Mask:
+    """Return (last + 1,) which harmonics of a motion lie upon a line of the mains, so that it stands in every cycle.
+
+    Parameters
+    ----------
+    cycle : frequency of the motion [Hz]
+    last : highest harmonic
+    resolution : of the record, the inverse of its length [Hz]
+    """
+    orders = np.arange(last + 1) * cycle
+    lines = ((h * mains, h * MAINS_TOLERANCE + resolution) for h in MAINS_ORDERS for mains in MAINS)
+    return np.asarray(np.any([np.abs(orders - line) <= wide for line, wide in lines], axis=0))
+
+
 def _waves(frequency: float, time: Array) -> Array:
     """Return cosine and sine of each harmonic below half the sampling rate (n, 2 h)."""
     rate = (time.size - 1) / float(time[-1] - time[0])

@@ -40,6 +40,10 @@ RATIO_STARTS = (0.0, -1.2, 1.2)
 """Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
 DELAY_STARTS = (0.0, -0.6, 0.6)
 """Where a fit of the delay begins [LARGEST_DELAY]: over a jump of dry friction no linearised step reaches far."""
+WEAK = 0.9
+"""Slope beside C from which an effect without a linear coordinate starts too, as a share of it.
+
+Reason: the linearised step sizes the others; a relief valve that changes the force by a percent does it so."""
 TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
@@ -290,7 +294,13 @@ def _absent(first: FirstState, name: str) -> Candidate:
     def searched(c: Coordinate, x: float) -> float:
         return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
 
-    grid = itertools.product(*(p.search.starts for p in known_effect(name).parameters))
+    unscaled = all(c.logarithmic for c in coordinates)
+    grid = itertools.product(
+        *(
+            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()))
+            for p in known_effect(name).parameters
+        )
+    )
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
     return Candidate(name, "damper", tuple(coordinates), starts, True, bool(known_effect(name).never_named))
 

@@ -275,8 +275,12 @@ class Findings:
         verdict: Verdict = "changed" if of_damper else "unchanged"
         if rivals:
             verdict = "ambiguous"
+        told = list(dict.fromkeys(name for names in others.values() for name in names))
         if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
+            # Beside what has no name a change that has rivals is not supported by itself.
             verdict = "unexplained"
+            told = list(dict.fromkeys([*(c.name for c in reported if c.name in rivals), *told]))
+            reported = [change for change in reported if change.name not in rivals]
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
@@ -288,7 +292,7 @@ class Findings:
             difference=difference,
             changes=tuple(listed),
             unchanged=self._unchanged(best),
-            rivals=tuple(dict.fromkeys(name for names in others.values() for name in names)),
+            rivals=tuple(told),
             reason=self._reason(verdict, listed, others, difference),
             next_test=self._next_test(best, rivals),
         )

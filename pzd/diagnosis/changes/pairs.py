@@ -21,7 +21,8 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import simulated_record
-from pzd.record import CONSTANT_SHARE, Array, Complex, Record
+from pzd.record import CONSTANT_SHARE, Array, Complex, Mask, Record
+from pzd.signals.harmonics import mains_harmonics
 from pzd.signals.noise import PureError, pure_error
 
 POINTS = 256
@@ -44,6 +45,11 @@ SAME_MOTION = 0.1
 """R.m.s. difference of two displacements that count as one motion, as a share of the larger.
 
 Reason: what the model misses, often a tenth of the force, then counts for a hundredth of it."""
+LEAST_MAINS = 4
+"""Lowest harmonic that is left out where it lies upon a line of the mains.
+
+Reason: the mains stand in every cycle alike where their frequency is a multiple of the motion's, so that no scatter
+tells of them; harmonics below carry the shape of the force, and few dampers are tested above a fourth of 50 Hz."""
 JUMP = 5.0
 """Multiple of the usual second difference from which two samples lie on either side of a jump."""
 NO_TEST = 1e9
@@ -204,6 +210,8 @@ class Comparison:
     """First sample that is compared."""
     rate: Array
     """(H + 1,) angular frequency of the harmonics [rad/s]."""
+    counted: Mask
+    """(H + 1,) which harmonics are compared; all spectra are zero at the others."""
     reference: Complex
     """(H + 1,) force of the first state in this motion [N]."""
     measured: Complex
@@ -244,8 +252,7 @@ class Comparison:
 
     def spectrum(self, force: Array) -> Complex:
         """Return the (H + 1,) harmonics of a simulated force (n,)."""
-        cycle = force[self.begin :]
-        return np.asarray(np.fft.rfft(cycle)[: self.rate.size] / cycle.size)
+        return force_spectrum(force[self.begin :], self.counted)
 
 
 def cycle_motion(
@@ -280,6 +287,19 @@ def compared_harmonics(test: AveragedTest, other: AveragedTest | None) -> int:
     return int(min(max(clear[-1] if clear.size else 0, FEWEST_HARMONICS), last))
 
 
+def force_spectrum(cycle: Array, counted: Mask) -> Complex:
+    """Return the (H + 1,) harmonics of a cycle (n,) of a force, zero where they are not counted."""
+    return np.asarray(np.where(counted, np.fft.rfft(cycle)[: counted.size] / cycle.size, 0.0))
+
+
+def counted_harmonics(last: int, *tests: AveragedTest) -> Mask:
+    """Return (last + 1,) which harmonics of some tests lie upon no line of the mains."""
+    order, hums = np.arange(last + 1), np.zeros(last + 1, dtype=bool)
+    for test in tests:
+        hums |= mains_harmonics(test.frequency, last, 1.0 / float(np.ptp(test.record.time)))
+    return ~hums | (order < LEAST_MAINS)
+
+
 def octave_mean(power: Array) -> Array:
     """Average (H + 1,) power over an octave about every harmonic; the mean of a cycle counts as the first harmonic."""
     order = np.arange(power.size)
@@ -304,7 +324,13 @@ def displacement_variance(damper: Damper, test: AveragedTest, last: int) -> Arra
     return np.asarray(np.mean([np.abs(harmonics(draw) - centre) ** 2 for draw in draws[1:]], axis=0))
 
 
-def jump_columns(test: AveragedTest, last: int, shift: float) -> Array:
+def stacked_variance(variance: Array, counted: Mask) -> Array:
+    """Return (2 H + 1,) variance of a stacked spectrum of (H + 1,) variance, zero where it is not counted [N^2]."""
+    kept = np.where(counted, variance, 0.0)
+    return np.concatenate([kept, kept[1:]])
+
+
+def jump_columns(test: AveragedTest, counted: Mask, shift: float) -> Array:
     """Return (2 H + 1, 2) difference by one standard deviation of the instant of all jumps up, and of all down [N].
 
     A jump of dry friction lies anywhere between two samples.
@@ -314,7 +340,7 @@ def jump_columns(test: AveragedTest, last: int, shift: float) -> Array:
     Parameters
     ----------
     test : whose samples they are
-    last : highest harmonic
+    counted : (H + 1,) which harmonics are compared
     shift : of the beginning of its cycle [cycles]
     """
     cycle = test.prepared.folded.mean(axis=0)
@@ -322,7 +348,7 @@ def jump_columns(test: AveragedTest, last: int, shift: float) -> Array:
     usual = 1.4826 * float(np.median(np.abs(np.roll(steps, -1) - steps)))
     jump = np.abs(np.roll(steps, -1) - steps) > JUMP * usual
     jumps = np.where(jump | np.roll(jump, 1), steps, 0.0) / np.sqrt(12.0)
-    spectra = (np.fft.rfft(np.where(sign * jumps > 0.0, jumps, 0.0))[: last + 1] / cycle.size for sign in (1.0, -1.0))
+    spectra = (force_spectrum(np.where(sign * jumps > 0.0, jumps, 0.0), counted) for sign in (1.0, -1.0))
     return np.column_stack([stacked(shifted(spectrum, shift)) for spectrum in spectra])
 
 
@@ -335,13 +361,8 @@ def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -
     moved = cycle_motion(shifted(after.displacement, shift), after.frequency, mean, before.voltage, before.temperature)
     force, measured = before.error.mean[: last + 1], shifted(after.error.mean[: last + 1], shift)
     first = float(course(before.error.mean, max(2 * before.error.mean.size, POINTS))[0])
-    begin = SETTLING * POINTS
-
-    def spectrum(motion: Motion) -> Complex:
-        cycle = respond(damper, motion, first)[begin:]
-        return np.asarray(np.fft.rfft(cycle)[: last + 1] / cycle.size)
-
-    simulated = spectrum(moved)
+    begin, counted = SETTLING * POINTS, counted_harmonics(last, before, after)
+    own_force, simulated = (force_spectrum(respond(damper, m, first)[begin:], counted) for m in (own, moved))
     variance = sum(
         (t.error.of_mean[: last + 1] + displacement_variance(damper, t, last) for t in (before, after)),
         start=np.zeros(last + 1),
@@ -355,12 +376,13 @@ def cycles_compared(damper: Damper, before: AveragedTest, after: AveragedTest) -
         moved,
         begin,
         2.0 * np.pi * after.frequency * np.arange(last + 1, dtype=np.float64),
-        force + simulated - spectrum(own),
-        measured,
+        counted,
+        np.where(counted, force, 0.0) + simulated - own_force,
+        np.where(counted, measured, 0.0),
         simulated,
         first,
-        np.concatenate([variance, variance[1:]]),
-        np.column_stack([jump_columns(before, last, 0.0), jump_columns(after, last, shift)]),
+        stacked_variance(variance, counted),
+        np.column_stack([jump_columns(before, counted, 0.0), jump_columns(after, counted, shift)]),
         float(np.max(np.abs(course(before.error.mean, max(2 * before.error.mean.size, POINTS))))),
         warmer,
         float(after.displacement[0].real) - mean,
@@ -383,8 +405,8 @@ def model_compared(damper: Damper, after: AveragedTest, mean: float, temperature
     motion = cycle_motion(after.displacement, after.frequency, mean, after.voltage, temperature)
     cycle = course(after.error.mean, max(2 * after.error.mean.size, POINTS))
     begin = SETTLING * POINTS
-    force = respond(damper, motion, float(cycle[0]))[begin:]
-    simulated = np.asarray(np.fft.rfft(force)[: last + 1] / force.size)
+    force, counted = respond(damper, motion, float(cycle[0]))[begin:], counted_harmonics(last, after)
+    simulated = force_spectrum(force, counted)
     variance = after.error.of_mean[: last + 1] + displacement_variance(damper, after, last)
     warmer = None if temperature is None or after.temperature is None else after.temperature - temperature
     return Comparison(
@@ -393,12 +415,13 @@ def model_compared(damper: Damper, after: AveragedTest, mean: float, temperature
         motion,
         begin,
         2.0 * np.pi * after.frequency * np.arange(last + 1, dtype=np.float64),
+        counted,
         simulated,
-        after.error.mean[: last + 1],
+        np.where(counted, after.error.mean[: last + 1], 0.0),
         simulated,
         float(cycle[0]),
-        np.concatenate([variance, variance[1:]]),
-        jump_columns(after, last, 0.0),
+        stacked_variance(variance, counted),
+        jump_columns(after, counted, 0.0),
         float(np.max(np.abs(force))),
         warmer,
         0.0,

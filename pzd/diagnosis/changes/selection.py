@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
-from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
+from pzd.diagnosis.changes.regression import LEVEL, USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
 from pzd.record import Array
 
@@ -59,6 +59,23 @@ def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
     return np.where(linear, start * np.clip(step[0], *SCALED), start)
 
 
+def _best_step(candidate: Candidate, columns: Array, r: Array) -> tuple[Array, Array]:
+    """Return what the best linearised step leaves of (w,) a residual, and the step, one number for each column.
+
+    The first of one column more than coordinates is the difference from 0 to the start. Its size is free where a
+    coordinate is linear; where all are logarithmic the start is what it is, and no step is longer than one.
+    """
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    if columns.shape[1] == len(candidate.coordinates) or not all(c.logarithmic for c in candidate.coordinates):
+        step = np.linalg.lstsq(columns / size, r, rcond=1e-6)[0] / size
+        return r - columns @ step, step
+    rest = r - columns[:, 0]
+    step = np.linalg.lstsq(columns[:, 1:] / size[1:], rest, rcond=1e-6)[0] / size[1:]
+    step /= max(1.0, float(np.max(np.abs(step))))
+    return rest - columns[:, 1:] @ step, np.concatenate([[1.0], step])
+
+
 @dataclass(eq=False)
 class Search:
     """Search for the changes that explain the difference of force."""
@@ -98,14 +115,11 @@ class Search:
             best, at = float(r @ r), np.array(candidate.starts[0])
             for start, columns in self._linearised(candidate):
                 own = projected_out(frame, np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)]))
-                size = np.linalg.norm(own, axis=0)
-                own = own / np.where(size > 0.0, size, 1.0)
                 if not np.all(np.isfinite(own)):
                     continue
-                step = np.linalg.lstsq(own, r, rcond=1e-6)[0]
-                left = r - own @ step
+                left, step = _best_step(candidate, own, r)
                 if left @ left < best:
-                    best, at = float(left @ left), _scaled(candidate, start, step / np.where(size > 0.0, size, 1.0))
+                    best, at = float(left @ left), _scaled(candidate, start, step)
             penalty = len(candidate.coordinates) * float(np.log(self.regression.likelihood.size))
             found.append(Promise(best + penalty, candidate, at))
         return sorted(found, key=lambda promise: promise.criterion)
@@ -133,17 +147,21 @@ class Search:
         asked = [c for c in self.candidates if self._flexible or not c.flexible]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
-    def _additions(self, before: Fitted) -> list[Fitted]:
-        """Return the fits with one more change that is visible and physical, the best first."""
+    def _additions(self, before: Fitted, least: float | None = None) -> list[Fitted]:
+        """Return the fits with one more change that is physical and makes at least so much force, the best first.
+
+        Without a limit it is that from which a change is adopted.
+        """
+        least = self._adoptable if least is None else least
         promising = self._promising(before, self._tried(before), before.scatter)
         worth = [
             p
             for i, p in enumerate(promising)
             if i < FITTED or p.candidate.name in ELEMENT_COLUMNS or p.candidate.of == "stand"
         ]
-        # What leaves more of the force than its absence only fits where the scatter is thought to be small.
-        limit = self.left(before)
-        fits = [f for f in (self._with(before, p) for p in worth) if self._admissible(f) and self.left(f) < limit]
+        # What leaves more of the force than its absence, the tests taken to differ alike, does not explain it.
+        tried = (self._with(before, p) for p in worth)
+        fits = [f for f in tried if self._admissible(f, least) and self.left(f) < self.left(before, f.scatter)]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
@@ -186,9 +204,12 @@ class Search:
         """Whether a fit leaves no more than the best one may leave in its direction."""
         return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden)
 
-    def left(self, fitted: Fitted) -> float:
-        """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks)."""
-        own = self.regression.likelihood.own_of_tests(fitted.residuals, fitted.scatter)
+    def left(self, fitted: Fitted, scatter: Scatter | None = None) -> float:
+        """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks).
+
+        The scatter is that of the fit, where no other one is given.
+        """
+        own = self.regression.likelihood.own_of_tests(fitted.residuals, scatter or fitted.scatter)
         squares = [
             max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
@@ -225,7 +246,7 @@ class Search:
                 less
                 for less, c in fewer
                 if best.bic - less.bic > self.adopt_bic
-                or not self._visible(best, c)
+                or self.size_of(best, c) < self._adoptable
                 or not self._predicts(best, c)
                 or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
             ]
@@ -240,14 +261,11 @@ class Search:
         start = np.concatenate([fitted.values_of(c) for c in kept]) if kept else np.zeros(0)
         return self._fit(kept, start, fitted.scatter)
 
-    def _admissible(self, fitted: Fitted) -> bool:
-        """Whether the last change of a fit is visible, and physical."""
+    def _admissible(self, fitted: Fitted, least: float) -> bool:
+        """Whether the last change of a fit is physical and makes at least so much force."""
         first = self.regression.response.first
         natural = first.is_natural(fitted.coordinates, fitted.values.tolist())
-        return natural and self._visible(fitted, fitted.candidates[-1])
-
-    def _visible(self, fitted: Fitted, candidate: Candidate) -> bool:
-        return self.size_of(fitted, candidate) >= self._least
+        return natural and self.size_of(fitted, fitted.candidates[-1]) >= least
 
     def _over_tests(self, squares: Sequence[float]) -> float:
         """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
@@ -263,13 +281,22 @@ class Search:
         return max(self.visible, self._hidden)
 
     @cached_property
-    def _hidden(self) -> float:
-        """R.m.s. force below which a change may be what the model misses of others, each test in units of its peak.
+    def _adoptable(self) -> float:
+        """R.m.s. force from which a change is adopted: what the model misses of others is seldom as much."""
+        return max(self.visible, self._missed(LEVEL))
 
-        A damper that misses a share of the force misses that share of a difference; of a test that it stands for, of
-        the force.
+    @cached_property
+    def _hidden(self) -> float:
+        """R.m.s. force below which a change may be what the model misses of others, each test in units of its peak."""
+        return self._missed(1.0)
+
+    def _missed(self, errors: float) -> float:
+        """Return the r.m.s. force that the model may miss, each test in units of its peak.
+
+        A damper that misses a share of the force misses that share of a difference, up to so many standard errors of
+        it; of a test that it stands for, of the force.
         """
-        known, squares = self.regression.likelihood.known_discrepancy, []
+        known, squares = errors * self.regression.likelihood.known_discrepancy, []
         for i, c in enumerate(self.regression.comparisons):
             missed = float(np.sum(self.regression.likelihood.missed_by_model(i)))
             squares.append((known**2 * float(c.difference @ c.difference) + missed) / c.peak**2)
@@ -277,15 +304,17 @@ class Search:
 
     def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
         """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
+        made = zip(self.regression.comparisons, self._made_by(fitted, candidate), strict=True)
+        return self._over_tests([float(d @ d) / c.peak**2 for c, d in made])
+
+    def _made_by(self, fitted: Fitted, candidate: Candidate) -> list[Array]:
+        """Return the (2 H + 1,) difference that a change makes beside the others in every comparison [N]."""
         coordinates = fitted.coordinates
-        off = [0.0 if c in candidate.coordinates else float(x) for c, x in zip(coordinates, fitted.values, strict=True)]
-        kept = [(c, x) for c, x in zip(coordinates, off, strict=True) if c not in candidate.coordinates]
-        others = self.regression.response.of([c for c, _ in kept], [x for _, x in kept])
-        squares = [
-            float(np.sum((d - o) ** 2)) / c.peak**2
-            for c, d, o in zip(self.regression.comparisons, fitted.differences, others, strict=True)
+        kept = [
+            (c, float(x)) for c, x in zip(coordinates, fitted.values, strict=True) if c not in candidate.coordinates
         ]
-        return self._over_tests(squares)
+        others = self.regression.response.of([c for c, _ in kept], [x for _, x in kept])
+        return [d - o for d, o in zip(fitted.differences, others, strict=True)]
 
     def _predicts(self, fitted: Fitted, candidate: Candidate) -> bool:
         """Whether held-out tests are predicted better with a change than without, the rest fitted alike.
@@ -298,8 +327,12 @@ class Search:
         whiteners = self.regression.likelihood.whiteners(fitted.scatter)
         columns = self.regression.columns(fitted.coordinates, fitted.values)
         J = [W @ c for W, c in zip(whiteners, columns, strict=True)]
-        target = [W @ r + own @ fitted.values for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)]
         kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
+        target = [
+            W @ r + own[:, kept] @ fitted.values[kept] for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)
+        ]
+        # Absent it makes no force, wherever its coordinates stand: that of a logarithm is no 0.
+        absent = [W @ d for W, d in zip(whiteners, self._made_by(fitted, candidate), strict=True)]
         gain = 0.0
         for fold in range(min(FOLDS, tests)):
             held = [i for i in range(tests) if i % FOLDS == fold]
@@ -307,7 +340,10 @@ class Search:
             A, b = np.concatenate([J[i] for i in seen]), np.concatenate([target[i] for i in seen])
             B, y = np.concatenate([J[i] for i in held]), np.concatenate([target[i] for i in held])
             full = y - B @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
-            less = y - B[:, kept] @ np.linalg.lstsq(A[:, kept], b, rcond=1e-10)[0] if kept.any() else y
+            b = b + np.concatenate([absent[i] for i in seen])
+            less = y + np.concatenate([absent[i] for i in held])
+            if kept.any():
+                less = less - B[:, kept] @ np.linalg.lstsq(A[:, kept], b, rcond=1e-10)[0]
             gain += float(less @ less - full @ full)
         return gain > 0.0
 
@@ -322,7 +358,7 @@ class Search:
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
         near = [f for f in fits if self._is_rival(f, best, less)]
-        return [fitted for fitted in near if self._admissible(fitted)]
+        return [fitted for fitted in near if self._admissible(fitted, self._least)]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or as good where much has no name.
@@ -341,7 +377,8 @@ class Search:
         """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
         if len(best.candidates) >= MOST_CHANGES:
             return []
-        more = [f for f in self._additions(best) if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
+        added = self._additions(best, self._least)
+        more = [f for f in added if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
         enough = best.bic + self.adopt_bic + self.rival_bic
         if not more or more[0].bic > enough:
             return []
