@@ -14,6 +14,7 @@ KINDS = (
     (b"\xd0\xcf\x11\xe0", "an Excel file of before 2007"),
     (b"\x1f\x8b", "a gzip archive"),
     (b"%PDF", "a PDF file"),
+    (b"|CF,", "a file of imc FAMOS"),
     (b"<?xml", "an XML file"),
     (b"<html", "an HTML page"),
     (b"<!DOCTYPE", "an HTML page"),

@@ -22,7 +22,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
-from pzd.rig.files.dialect import after_lines
+from pzd.rig.files.dialect import BLANKS, after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, own_quantity
 from pzd.rig.files.reading import read
@@ -270,7 +270,7 @@ def _may_hold(head: str, below: str | None, quantity: Quantity) -> bool:
     return not unit or unit in _RECORDER or unit_of(head, below, quantity) is not None
 
 
-_RECORDER = ("V", "mV", "Volts", "count", "counts", "bit", "digit", "-", "%")
+_RECORDER = ("V", "mV", "Volt", "Volts", "count", "counts", "bit", "digit", "-", "%")
 """Units of a recorder, of which one stands for so much of the quantity."""
 
 
@@ -305,7 +305,10 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
     if dialect.separator in (" ", dialect.decimal):
         yield f'separator: "{dialect.separator}"'
     if dialect.apart:
-        yield f"header: [{', '.join(map(written, dialect.header))}]    # blanks stand in the headers of the file"
+        why = (
+            "blanks stand in the headers of the file" if dialect.separator == BLANKS else "from further up in the file"
+        )
+        yield f"header: [{', '.join(map(written, dialect.header))}]    # {why}"
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
     if dialect.decimal == ",":
@@ -488,6 +491,12 @@ def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     if dialect.headless:
         return replace(file, columns=tuple(_by_values(file).items()))
     line = dialect.header_line if form == TEXT else None
+    keyed = [cell for head in dialect.header for cell in head.split() if _KEYED.fullmatch(cell)]
+    if len(keyed) > 1:
+        raise DataError(
+            f"{at(path, line)}: a name stands beside each number (got {keyed[0]}); write the names once, in a line "
+            "above the rows"
+        )
     here = ", ".join(head for head in dialect.header if head.strip())
     what = _no_test_of_a_damper(file, columns)
     if what is not None:
@@ -502,6 +511,9 @@ def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
         raise DataError(f"{at(path, line)}: {what}{', as telemetry of a car has' if telemetry else ''}")
     return file
 
+
+_KEYED = re.compile(r"[A-Za-z_]\w*\s*[:=]\s*[-+]?[\d.]+([eE][-+]?\d+)?")
+"""A cell as the plotter of Arduino takes them: `pos:1.25`."""
 
 # --- What a file is that holds no test of a damper ---
 
@@ -547,6 +559,8 @@ def _ranges(file: SniffedFile) -> Iterator[str]:
     """Write the range of every column of a table without headers, so that one sees which is which."""
     sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset(file.dialect.header)), "rig.files")
     for column, values in sheet.numbers.items():
+        if not np.isfinite(values).any():
+            continue
         turns = int(np.count_nonzero(np.diff(np.sign(np.diff(values))) != 0))
         course = "rises evenly" if turns == 0 and values[-1] > values[0] else f"turns {turns} times"
         yield f"# {sheet.header[column]}: {np.nanmin(values):.4g} to {np.nanmax(values):.4g}, {course}"

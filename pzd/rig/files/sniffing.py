@@ -10,7 +10,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,8 @@ from pzd.schema.errors import DataError, at
 # --- Quantity of a column, by its header in English, German, French, Spanish, Italian, Polish, Chinese or Japanese ---
 
 _LOOKS_LIKE = {
-    TIME: r"^t$|^tout$|^x_value$|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
+    TIME: r"^t$|^tout$|^x_value$|^x-axis$|^x_axis$|^epoch|^millis|^micros"
+    r"|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
     r"|\u65f6\u95f4|\u6642\u9593",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera"
     r"|spostament|corsa|przemieszcz|^skok|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
@@ -250,7 +251,8 @@ class Dialect:
     units_row: bool = False
     """Whether the units are in a row below the header."""
     apart: bool = False
-    """Whether blanks separate the rows, and stand within the headers too: the config names the headers then."""
+    """Whether the config names the headers, since no line holds them as they are: blanks separate the rows and stand
+    within the headers too, or further lines stand below them."""
     headless: bool = False
     """Whether the file has no headers; those here are made up."""
 
@@ -409,13 +411,13 @@ def _table(
     """Find the table in rows read this way, rated by its rows and then the numbers in them."""
     rows = [[_unquoted(cell) for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
-    data = [n for n, row in enumerate(rows) if len(row) > 1 and 2 * numbers[n] >= len(row) and numbers[n]]
+    data = [n for n, row in enumerate(rows) if len(row) > 1 and _mostly_numbers(row, numbers[n])]
     # A line of the preamble, say one of a date, may hold numbers too, but it is narrower than the table.
     usual = Counter(len(rows[n]) for n in data).most_common(1)[0][0] if data else 0
-    data = [n for n in data if len(rows[n]) >= usual]
+    data = _of_the_table(rows, [n for n in data if len(rows[n]) >= usual], decimal)
     if not data:
         return None
-    first = data[0]
+    first = start = data[0]
     if first == 0:
         return _headless(rows, data, numbers, encoding, separator, decimal)
     width = len(rows[first])
@@ -428,7 +430,7 @@ def _table(
         data = [
             n
             for n in range(first, len(rows))
-            if len(rows[n]) >= usual and 2 * _numbers(rows[n], decimal) >= len(rows[n])
+            if len(rows[n]) >= usual and _mostly_numbers(rows[n], _numbers(rows[n], decimal))
         ]
         numbers = [_numbers(row, decimal) for row in rows]
     if width == len(rows[first - 1]) + 1 and not any(rows[n][-1] for n in data if len(rows[n]) == width):
@@ -439,7 +441,10 @@ def _table(
     units = (
         units
         and any(below)
-        and all(_UNIT.fullmatch(cell) or cell.strip("[]() ") in SPELLINGS for cell in below if cell)
+        and (
+            all(_UNIT.fullmatch(cell) or cell.strip("[]() ") in SPELLINGS for cell in below if cell)
+            or _channels_in_units(rows[first - 2], below)
+        )
     )
     top = first - 1 - units
     if len(rows[top]) != width:
@@ -451,16 +456,73 @@ def _table(
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
+    if not assigned(found.header, named, control_of(found.header)):
+        names = _names_further_up(rows, first, width)
+        found = replace(found, header=names, units=None, skip=start, units_row=False, apart=True) if names else found
     return (len(alike), sum(numbers[n] for n in alike)), found
+
+
+_FEWEST_NAMED = 2  # channels of a rig in a line of names; one may be named by chance
+_MOST_HEADS = 6  # lines from the names to the rows: units, comments, sensors, starts and steps of each channel
+
+
+def _channels_in_units(names: Sequence[str], below: Sequence[str]) -> bool:
+    """Whether some cells are units of displacement and force, of channels that the line above names otherwise."""
+    found = [
+        quantity
+        for name, cell in zip(names, below, strict=True)
+        for quantity in (DISPLACEMENT, FORCE)
+        if name != cell and unit_of("", cell, quantity) is not None
+    ]
+    return {DISPLACEMENT, FORCE} <= set(found)
+
+
+def _names_further_up(rows: Sequence[Sequence[str]], first: int, width: int) -> tuple[str, ...] | None:
+    """Return the names of the columns, with the units from a line below them, above other lines on each channel."""
+    above = [n for n in range(max(first - _MOST_HEADS, 0), first) if len(rows[n]) == width]
+    top = next((n for n in above if len(assigned(rows[n], None, control_of(rows[n]))) >= _FEWEST_NAMED), None)
+    if top is None:
+        return None
+    under = [n for n in above if n > top and all(_UNIT.fullmatch(cell) or not cell for cell in rows[n])]
+    units = rows[under[0]] if under else [""] * width
+    return tuple(
+        f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(rows[top], units, strict=True)
+    )
+
+
+def _mostly_numbers(row: Sequence[str], numbers: int) -> bool:
+    """Whether a row of cells may be one of a table; empty cells say nothing."""
+    return numbers > 0 and 2 * numbers >= sum(bool(cell) for cell in row)
+
+
+def _of_the_table(rows: Sequence[Sequence[str]], data: list[int], decimal: str) -> list[int]:
+    """Return those of the lines of numbers that are of the table: not of one of settings or results above it.
+
+    The columns that hold numbers in nearly every line hold them in the first one too, and a small table that more than
+    a few lines of other kinds part from the one below it is another.
+    """
+    count = Counter(i for n in data for i, cell in enumerate(rows[n]) if _numbers([cell], decimal))
+    always = [i for i, lines in count.items() if lines > _NEARLY_ALL * len(data)]
+    whole = [n for n in data if all(i < len(rows[n]) and _numbers([rows[n][i]], decimal) for i in always)] or data
+    parts = np.split(np.array(whole), np.flatnonzero(np.diff(whole) > _MOST_BETWEEN) + 1) if whole else []
+    longest = max((part.size for part in parts), default=0)
+    first = next((int(part[0]) for part in parts if 4 * part.size >= longest), 0)
+    return [n for n in data if n >= first]
+
+
+_NEARLY_ALL = 0.9  # of the lines; in the others a cell is empty
+_MOST_BETWEEN = 3  # lines from one of the table to the next: a message of the logger, or the head of the next test
 
 
 def _headless(
     rows: list[list[str]], data: list[int], numbers: list[int], encoding: str, separator: str, decimal: str
 ) -> tuple[tuple[int, int], Dialect] | None:
-    """Make the dialect of a table without headers, of which every cell is a number."""
+    """Make the dialect of a table without headers, of which two columns or more hold numbers throughout."""
     width = len(rows[0])
     alike = [n for n in data if len(rows[n]) == width]
-    if width < 2 or numbers[0] < width:
+    # a scope writes its settings beside the first rows
+    always = [i for i in range(width) if all(_numbers([rows[n][i]], decimal) for n in alike)]
+    if width < 2 or (numbers[0] < width and len(always) < 2):
         return None
     header = tuple(f"column{n + 1}" for n in range(width))
     found = Dialect(header, None, tuple(rows[0]), encoding, separator, decimal, headless=True)

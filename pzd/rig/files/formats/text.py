@@ -288,8 +288,10 @@ def _refuse_repeated_header(path: Path, numbers: NDArray[np.int64], rows: Sequen
 def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: int) -> list[str]:
     """Describe rows with more or fewer fields than the header."""
     separator = "" if lines.separator == _UNQUOTED else f" (separator {lines.separator!r})"
+    message = _messages_begin(lines, rows)
+    said = f"; if this is a message of the logger, say comment: {message}" if message else ""
     shown = [
-        f"{at(path, int(lines.numbers[r]))}: {lines.fields[r]} fields where the header has {width}{separator}"
+        f"{at(path, int(lines.numbers[r]))}: {lines.fields[r]} fields where the header has {width}{separator}{said}"
         for r in rows[:MOST_FAULTS]
     ]
     if rows.size <= MOST_FAULTS:
@@ -297,6 +299,19 @@ def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: in
     most = rows.size > lines.fields.size // 2
     advice = "; if the header stands further down, say skip: lines above it" if most else ""
     return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{advice}"]
+
+
+def _messages_begin(lines: _Lines, rows: NDArray[np.int64]) -> str | None:
+    """Return the letter or mark that begins every uneven row and no other; None where there is none."""
+    every = lines.body.split("\n")
+    begins = {every[row].lstrip()[:1] for row in rows.tolist()}
+    if len(begins) != 1 or rows.size > lines.fields.size // 2:
+        return None
+    (begin,) = begins
+    if not begin or begin.isdigit() or begin in "+-.\"' ":
+        return None
+    others = sum(line.lstrip().startswith(begin) for line in every)
+    return (f"'{begin}'" if not begin.isalpha() else begin) if others == rows.size else None
 
 
 def _steps(

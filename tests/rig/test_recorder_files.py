@@ -1,0 +1,378 @@
+"""Small files as the recorders and machines that are sold write them: init proposes, a person fills in, check reads.
+
+Each is written here after the layout that its maker publishes or that its users show, by code that shares nothing with
+the reader; every one is the same test, 15 mm at 2 Hz on a damper of 1200 N s/m and 150 N of friction.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pzd.quantities import Control
+from pzd.record import Array
+from pzd.rig.config import RigConfig
+from pzd.rig.files.guess import guessed
+from pzd.rig.stage import ingest
+from pzd.schema.errors import DataError
+
+RATE, SAMPLES = 500.0, 1000
+TIME = np.arange(SAMPLES) / RATE
+OMEGA = 4.0 * np.pi
+X, V = 0.015 * np.sin(OMEGA * TIME), 0.015 * OMEGA * np.cos(OMEGA * TIME)
+FORCE = 1200.0 * V + 150.0 * np.tanh(V / 2e-3)
+MM, INCH, POUND = 1e3 * X, X / 0.0254, FORCE / 4.4482216152605
+
+
+def table(*columns: Sequence[str] | Array, by: str = ",", decimal: str = ".", end: str = "") -> Iterator[str]:
+    """Rows of cells, numbers to nine digits."""
+    for row in zip(*columns, strict=True):
+        yield by.join(c if isinstance(c, str) else f"{c:.9g}".replace(".", decimal) for c in row) + end
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A file, and what a person fills in or changes of what init proposes."""
+
+    lines: tuple[str, ...]
+    suffix: str = "csv"
+    encoding: str = "utf-8"
+    columns: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    rate_Hz: float | None = None
+    fineness: tuple[float, float, float] = (1e-6, 1e-8, 1e-3)
+    """Largest difference of time [s], displacement [m] and force [N]."""
+
+
+CLOCK = [f"{int(t)}.{round(1e3 * (t - int(t))):03d}" for t in TIME]
+SCOPE = {"displacement": "10 mm", "force": "100 N"}
+"""What a volt stands for."""
+SETTINGS = [("Record Length", "1000"), ("Sample Interval", "0.002"), ("Trigger Point", "0"), ("Source", "CH1")]
+"""Of a scope, beside the first rows."""
+FILES = {
+    "Hioki, settings of each channel above": Recorded(
+        (
+            '"File name","WAVE0001.CSV","V1.00"',
+            '"Title comment",""',
+            "\"Start trigger time\",\"'24-06-30 15:53:03\"",
+            '"CH","CH1","CH2","CH3","CH4",',
+            '"Mode","DC","DC","DC","DC",',
+            '"Range","500mV","2V","5V","50V",',
+            '"Comment","Stroke","Load","","",',
+            '"Scaling","On","On","Off","Off",',
+            '"Ratio"," 1.00000E+01"," 5.00000E+02"," 1.00000E+00"," 1.00000E+00",',
+            '"Offset"," 0.00000E+00"," 0.00000E+00"," 0.00000E+00"," 0.00000E+00",',
+            '"Time","CH1[mm]","CH2[N]","CH3[V]","CH4[V]",',
+            *(f"{t:.9E},{x: .7E},{f: .7E}, 1.00000E-03,-2.57813E+00," for t, x, f in zip(TIME, MM, FORCE, strict=True)),
+        ),
+        columns={"displacement": "CH1[mm]", "force": "CH2[N]"},
+        units={"time": "s", "displacement": "mm", "force": "N"},
+    ),
+    "Graphtec, numbers, dates and milliseconds": Recorded(
+        (
+            "Vendor,GRAPHTEC Corporation",
+            "Model,GL980, Ver1.05",
+            "Sampling interval,2ms",
+            "Total data points,1000",
+            "Start time,2024-06-03,14:22:10",
+            "AMP settings,",
+            "CH,Signal name,Input,Range,Filter,Span",
+            "CH1,STROKE,DC,10V,Off,   50.0,  -50.0,mm",
+            "CH2,LOAD,DC,5V,Off,   2000,  -2000,N",
+            "Logic/Pulse,Off",
+            "Data",
+            "Number,Date&Time,ms,CH1,CH2,Alarm1-10,AlarmOut",
+            "NO.,Time,ms,mm,N,A12345678910,A1234",
+            *(
+                f"{n + 1},2024/06/03 14:22:{10 + int(t):02d},"
+                f"{round(1e3 * (t - int(t)))},{x:+.6f},{f:+.4f},LLLLLLLLLL,LLLL"
+                for n, (t, x, f) in enumerate(zip(TIME, MM, FORCE, strict=True))
+            ),
+        ),
+        columns={"time": "", "displacement": "CH1", "force": "CH2"},
+        rate_Hz=500.0,
+    ),
+    "Instron, a table of results above the raw data": Recorded(
+        (
+            "Specimen label,damper 3",
+            "Rate 1,10.0,mm/min",
+            "",
+            "Results Table 1",
+            ",Maximum Load (N),Extension at Maximum (mm)",
+            "1,376.2,0.01",
+            "",
+            "Raw Data",
+            '"Time","Extension","Load"',
+            '"(sec)","(mm)","(N)"',
+            *(f'"{t:.4f}","{x:.6f}","{f:.5f}"' for t, x, f in zip(TIME, MM, FORCE, strict=True)),
+        )
+    ),
+    "Zwick, a report above, German": Recorded(
+        (
+            '"Pr\u00fcfprotokoll";"D\u00e4mpfer 12"',
+            '"Kunde";"intern"',
+            '"Pr\u00fcfzeit";"Standardweg";"Standardkraft"',
+            '"s";"mm";"N"',
+            *table(TIME, MM, FORCE, by=";", decimal=","),
+        ),
+        encoding="cp1252",
+    ),
+    "Dewesoft, channels with their input": Recorded(
+        (
+            "Dewesoft X data export",
+            "Start time: 2024-02-03 10:11:12.345",
+            "Sample rate: 500 Hz",
+            "",
+            "Time (s)\tDisp/AI 1 (mm)\tForce/AI 2 (N)",
+            *table(TIME, MM, FORCE, by="\t"),
+        ),
+        "txt",
+    ),
+    "catman, starts and steps of each channel below the units": Recorded(
+        (
+            "HBM_CATMAN_DATAFILE_40",
+            "KOMMENTAR",
+            "",
+            "ANZAHL KANAELE: 3",
+            "",
+            "Zeit  1 - Standardmessrate\tWeg_WA50\tKraft_U9C",
+            "s\tmm\tN",
+            "T0=0\tT0=0\tT0=0",
+            "dt=0,002\tdt=0,002\tdt=0,002",
+            *table(TIME, MM, FORCE, by="\t", decimal=","),
+        ),
+        "asc",
+        "cp1252",
+    ),
+    "Tektronix, names above": Recorded(
+        (
+            "Model,MSO44",
+            "Waveform Type,ANALOG",
+            "Sample Interval,0.002",
+            "Record Length,1000",
+            "",
+            "TIME,CH1,CH2",
+            *table(TIME, 100.0 * X, FORCE / 100.0),
+        ),
+        columns={"displacement": "CH1", "force": "CH2"},
+        units={"time": "s", **SCOPE},
+    ),
+    "Tektronix, settings beside the first rows, no header": Recorded(
+        tuple(
+            f"{','.join(SETTINGS[n] if n < len(SETTINGS) else ('', ''))},,{t:.6f},{x:.8f},{f:.8f},"
+            for n, (t, x, f) in enumerate(zip(TIME, 100.0 * X, FORCE / 100.0, strict=True))
+        ),
+        columns={"displacement": "column5", "force": "column6"},
+        units={"time": "s", **SCOPE},
+    ),
+    "Keysight, channels by number": Recorded(
+        ("x-axis,1,2", "second,Volt,Volt", *table(TIME, 100.0 * X, FORCE / 100.0)),
+        columns={"displacement": "1", "force": "2"},
+        units=SCOPE,
+    ),
+    "PicoScope, milliseconds and an empty line": Recorded(
+        ("Time,Channel A,Channel B", "(ms),(V),(V)", "", *table(1e3 * TIME, 100.0 * X, FORCE / 100.0)),
+        columns={"displacement": "Channel A", "force": "Channel B"},
+        units=SCOPE,
+    ),
+    "Saleae, volts about the middle of their range": Recorded(
+        ("Time [s],Channel 0,Channel 1", *table(TIME, 2.5 + 100.0 * X, 2.5 + FORCE / 1000.0)),
+        columns={"displacement": "Channel 0", "force": "Channel 1"},
+        units={"displacement": "10 mm/V about 2.5 V", "force": "1000 N/V about 2.5 V"},
+        fineness=(1e-6, 1e-7, 1e-2),
+    ),
+    "Arduino, messages above": Recorded(
+        (
+            "Booting...",
+            "HX711 ready, tare done",
+            "millis,pos_mm,load_N",
+            *table([f"{1e3 * t:.0f}" for t in TIME], MM, FORCE),
+        ),
+        "log",
+        units={"time": "ms"},
+    ),
+    "a Chinese machine, in GBK": Recorded(
+        (
+            "\u8bd5\u9a8c\u7f16\u53f7:\t2024-001",
+            "\u91c7\u6837\u9891\u7387:\t500Hz",
+            "\u5e8f\u53f7\t\u65f6\u95f4(s)\t\u4f4d\u79fb(mm)\t\u8d1f\u8377(N)",
+            *table([str(n + 1) for n in range(SAMPLES)], TIME, MM, FORCE, by="\t"),
+        ),
+        "txt",
+        "gbk",
+    ),
+    "a Chinese machine, deformation beside the displacement, kN": Recorded(
+        (
+            "\u65f6\u95f4,\u529b(kN),\u53d8\u5f62(mm),\u4f4d\u79fb(mm)",
+            "\u79d2,kN,mm,mm",
+            *table(TIME, 1e-3 * FORCE, np.full(SAMPLES, 0.1), MM),
+        ),
+        encoding="gb18030",
+    ),
+    "Roehrig, inches and pounds": Recorded(
+        (
+            "ROEHRIG ENGINEERING - SHOCK 6.3",
+            "File: front_left_01.rdt",
+            "Stroke (in): 1.18",
+            "",
+            "Time\tPosition\tVelocity\tForce\tTemp",
+            "sec\tin\tin/sec\tlbf\tdegF",
+            *table(TIME, INCH, V / 0.0254, POUND, np.full(SAMPLES, 77.0), by="\t"),
+        ),
+        "txt",
+    ),
+    "MTS, a block of a station": Recorded(
+        (
+            "MTS793|MPT|ENU|1|2|.|/|:|1|0|0|A",
+            "Data Header:\t\tTime:\t2.0000\tSec\t3/2/2024 10:11:12 AM",
+            "Data Acquisition:\t\tTimed",
+            "Station Name:\tdamper rig",
+            "Time\tAxial Displacement\tAxial Force",
+            "Sec\tmm\tN",
+            *table(TIME, MM, FORCE, by="\t"),
+        ),
+        "dat",
+    ),
+    "French, centimetres and decanewtons": Recorded(
+        ("temps (s);course (cm);effort (daN)", *table(TIME, 0.1 * MM, 0.1 * FORCE, by=";", decimal=",")),
+        encoding="latin-1",
+    ),
+    "instants with a zone": Recorded(
+        (
+            "timestamp,stroke_mm,force_kN",
+            *table([f"2024-03-02T10:15:{t:09.6f}+01:00" for t in TIME], MM, 1e-3 * FORCE),
+        )
+    ),
+    "American, a clock of twelve hours beside the date": Recorded(
+        (
+            "Date,Time,Position (in),Load (lbs)",
+            *table(["3/2/2024"] * SAMPLES, [f"2:05:{7.0 + t:06.3f} PM" for t in TIME], INCH, POUND),
+        )
+    ),
+    "milliseconds since 1970": Recorded(
+        ("epoch_ms,x_mm,F_N", *table([f"{1717400000000 + round(1e3 * t)}" for t in TIME], MM, FORCE))
+    ),
+    "days of Excel": Recorded(
+        ("Date/Time,Weg (mm),Kraft (N)", *table([f"{45353.5 + t / 86400.0:.12f}" for t in TIME], MM, FORCE)),
+        units={"time": "d"},
+    ),
+}  # fmt: skip
+
+
+def written(name: str, folder: Path) -> Path:
+    """The file, with line ends of Windows."""
+    one = FILES[name]
+    path = folder / f"a.{one.suffix}"
+    lines = one.lines
+    if "settings beside" in name:  # each channel of this scope has a file of its own; here both stand in one
+        lines = tuple(line.rstrip(",") for line in lines)
+    path.write_bytes(("\r\n".join(lines) + "\r\n").encode(one.encoding))
+    return path
+
+
+def filled(name: str, path: Path) -> dict[str, Any]:
+    """The entry that init proposes, with what a person says; nothing else is left empty."""
+    one = FILES[name]
+    entry: dict[str, Any] = yaml.safe_load("\n".join(guessed([path])))["rig"]["files"][0]
+    entry |= {"path": path.name} | ({"rate_Hz": one.rate_Hz} if one.rate_Hz else {})
+    for key, values in (("columns", one.columns), ("units", one.units)):
+        entry[key] = {**(entry.get(key) or {}), **values}
+    left_out = [quantity for quantity, header in entry["columns"].items() if header == ""]
+    entry["units"] = {quantity: unit for quantity, unit in entry["units"].items() if quantity not in left_out}
+    assert not [key for key in ("columns", "units") for value in entry[key].values() if value is None]
+    return entry
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_a_recorder_writes_is_read_once_the_empty_places_are_filled(name: str, tmp_path: Path) -> None:
+    path = written(name, tmp_path)
+    config = RigConfig.model_validate_json(json.dumps({"files": [filled(name, path)]}))
+    (record,) = ingest(config, Control(), tmp_path).records
+    within = FILES[name].fineness
+    np.testing.assert_allclose(record.time - record.time[0], TIME, atol=within[0])
+    np.testing.assert_allclose(record.displacement, X, atol=within[1])
+    np.testing.assert_allclose(record.force, FORCE, atol=within[2])
+
+
+def proposed(path: Path) -> dict[str, Any]:
+    """The entry that init proposes."""
+    entry: dict[str, Any] = yaml.safe_load("\n".join(guessed([path])))["rig"]["files"][0]
+    return {**entry, "path": path.name}
+
+
+ARDUINO = FILES["Arduino, messages above"].lines
+
+
+def test_a_message_within_the_rows_is_told_and_the_advice_reads_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_text("\n".join([*ARDUINO[:400], "WARN: sensor timeout", *ARDUINO[400:]]) + "\n", encoding="utf-8")
+    entry = proposed(path)
+    entry["units"]["time"] = "ms"
+    with pytest.raises(DataError, match=r"a\.log:401: 1 fields .*if this is a message of the logger, say comment: W$"):
+        ingest(RigConfig.model_validate_json(json.dumps({"files": [entry]})), Control(), tmp_path)
+    said = RigConfig.model_validate_json(json.dumps({"files": [{**entry, "comment": "W"}]}))
+    (record,) = ingest(said, Control(), tmp_path).records
+    np.testing.assert_allclose(record.force, FORCE, atol=1e-3)
+
+
+TOLD = {
+    "names beside each number": (
+        tuple(f"t:{1e3 * t:.0f} pos:{x:.3f} load:{f:.2f}" for t, x, f in zip(TIME, MM, FORCE, strict=True)),
+        r"a name stands beside each number \(got t:0\); write the names once, in a line above the rows",
+    ),
+    "points between thousands": (
+        (
+            "Zeit [ms];Weg [mm];Kraft [N]",
+            *(
+                ";".join(f"{c:,.{d}f}".translate(str.maketrans(",.", ".,")) for c, d in ((t, 0), (x, 4), (f, 2)))
+                for t, x, f in zip(1e3 * TIME, MM, 10.0 * FORCE, strict=True)
+            ),
+        ),
+        r"a number is needed \(got '1\.000'\)",
+    ),
+    "units in the cells": (
+        ("Time,Position,Force", *(f"{t:.3f} s,{x:.5f} mm,{f:.4f} N" for t, x, f in zip(TIME, MM, FORCE, strict=True))),
+        r"a number is needed \(got '0\.000 s'\)",
+    ),
+    "a clock and an arrow": (
+        tuple(f"14:05:{7.0 + t:06.3f} -> {x:.3f},{f:.2f}" for t, x, f in zip(TIME, MM, FORCE, strict=True)),
+        r"a number is needed \(got '14:05:07\.000 -> 0\.000'\)",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_cannot_be_read_is_told_with_its_place(name: str, tmp_path: Path) -> None:
+    lines, words = TOLD[name]
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match=words):  # noqa: PT012  # init refuses some, reading the others
+        entry = proposed(path)
+        if "column1" in entry.get("header", ()):
+            entry |= {"rate_Hz": 500.0, "columns": {"displacement": "column1", "force": "column2"}}
+            entry["units"] = {"displacement": "mm", "force": "N"}
+        asked = {"time": "s", "displacement": "mm", "force": "N"}
+        units = entry.get("units") or {}
+        entry["units"] = {quantity: unit or asked[quantity] for quantity, unit in units.items()}
+        ingest(RigConfig.model_validate_json(json.dumps({"files": [entry]})), Control(), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("start", "kind"),
+    [
+        (b"|CF,2,1,1;|CK,1,3,1,1;\r\n|NO,1,11,0,0,imc STUDIO;\x00\x01", "a file of imc FAMOS"),
+        (b'<?xml version="1.0"?>\n<usi:tdm xmlns:usi="http://www.ni.com/Schemas/USI/1_0">', "an XML file"),
+    ],
+)
+def test_a_file_that_no_format_reads_is_told_by_its_kind(start: bytes, kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.dat"
+    path.write_bytes(start)
+    with pytest.raises(DataError, match=f"this is {kind}; export the table as xlsx, CSV or other delimited text"):
+        guessed([path])
