@@ -30,8 +30,11 @@ from typing import Any, NoReturn, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from llvmlite.binding import parse_bitcode  # type: ignore[import-untyped]  # numba has no types either
 from numba import types
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.serialize import dumps
 from numba.extending import typeof_impl
 
@@ -201,6 +204,91 @@ class _Cache(FunctionCache):
             _warn_of_cache(error.strerror or str(error))
 
 
+class _Bitcode(JITCodeLibrary):
+    """The code of a function that compiled functions alone call: bitcode, which becomes machine code in its callers.
+
+    By itself numba optimises each function together with all that it calls, and makes machine code of it that nobody
+    runs: at each level of calls everything below is done again, which takes most of the time of compiling.
+    """
+
+    def finalize(self) -> None:
+        """Take in the functions that are called, as they are."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001  # numba's name
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return numba's sign that there is no machine code."""
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> _NoEnvironment:
+        """What numba gives the environment to, which machine code would need."""
+        return _NoEnvironment()
+
+    def serialize_using_object_code(self) -> tuple[str, bytes]:
+        """Return what `rebuilt` takes."""
+        return self.name, self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def rebuilt(cls, codegen: Any, saved: tuple[str, bytes]) -> _Bitcode:
+        """Return bitcode as it was saved."""
+        library = cls(codegen, saved[0])
+        library._final_module = library._shared_module = parse_bitcode(saved[1])
+        library._finalized = True
+        return library
+
+
+class _NoEnvironment:
+    """Stands where numba sets the environment of machine code."""
+
+    def set_env(self, name: str, environment: object) -> None:
+        """Set nothing."""
+
+
+class _BitcodeCompiler(Compiler):
+    """Numba's compiler, which makes bitcode alone."""
+
+    def define_pipelines(self) -> Any:
+        """Return numba's own pipeline."""
+        self.state.library = _Bitcode(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+class _BitcodeCacheImpl(CompileResultCacheImpl):
+    """How bitcode is saved."""
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Return the result of a compilation as it was saved; see `CompileResult._reduce`."""
+        saved, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, _ = payload
+        library = _Bitcode.rebuilt(target_context.codegen(), saved)
+        return CompileResult(  # type: ignore[call-arg]  # numba has no types
+            typing_context=target_context.typing_context,
+            target_context=target_context,
+            entry_point=target_context.get_executable(library, fndesc, environment),
+            typing_error=None,
+            type_annotation=annotation,
+            signature=signature,
+            objectmode=objectmode,
+            lifted=lifted,
+            fndesc=fndesc,
+            library=library,
+            call_helper=None,
+            environment=environment,
+            metadata=None,
+            reload_init=reload_init,
+            referenced_envs=(),
+        )
+
+
+class _BitcodeCache(_Cache):
+    """The cache of functions that are bitcode alone."""
+
+    _impl_class = _BitcodeCacheImpl  # type: ignore[assignment]  # numba has no types
+
+
 @cache
 def _warn_of_cache(why: str) -> None:
     """Say once that kernels cannot be kept."""
@@ -236,7 +324,7 @@ class Kernel:
         self._function = function
         inner = _copied(function, function.__globals__)
         inner.__qualname__ = f"{function.__qualname__}.inner"  # by which numba keeps it in its cache
-        self.inner = _dispatcher(inner, no_cpython_wrapper=True)
+        self.inner = _dispatcher(inner, _BitcodeCache, no_cpython_wrapper=True, pipeline_class=_BitcodeCompiler)
 
     @cached_property
     def outer(self) -> Any:
@@ -259,7 +347,7 @@ def _copied(function: FunctionType, names: dict[str, Any]) -> FunctionType:
     return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
 
-def _dispatcher(function: FunctionType, **options: Any) -> Any:
+def _dispatcher(function: FunctionType, kept: type[_Cache] = _Cache, **options: Any) -> Any:
     """Return numba's dispatcher of a function, which compiles in one process at a time.
 
     Where several processes begin on an empty cache, each kernel is compiled by the first that needs it while the others
@@ -270,7 +358,7 @@ def _dispatcher(function: FunctionType, **options: Any) -> Any:
     if dispatcher is function:  # under NUMBA_DISABLE_JIT, for a debugger
         return function
     try:
-        dispatcher._cache = _Cache(function)  # noqa: SLF001  # numba documents no way to give it another
+        dispatcher._cache = kept(function)  # noqa: SLF001  # numba documents no way to give it another
     except (OSError, RuntimeError):  # numba's word for a folder that it cannot write to
         _warn_of_cache("numba cannot write there")
     compile_now = dispatcher.compile

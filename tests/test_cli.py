@@ -862,7 +862,7 @@ Damper(base=base, effects={{'gas_spring': {{'k_g': 1000}}}})
 tell('a config that names effects')
 
 from pzd.pipeline.stages import stages
-import pzd.pipeline.command, pzd.rig.files.reading
+import pzd.pipeline.command, pzd.pipeline.dependencies, pzd.pipeline.run_summary
 stages(S(rig=S(virtual=None), car=True))
 tell('all is fresh')
 """

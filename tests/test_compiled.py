@@ -156,6 +156,38 @@ def test_an_edited_effect_file_is_compiled_anew_although_the_kernels_that_call_i
     assert force("3.0") == 150.0
 
 
+CALLED = """
+import sys
+import numpy as np
+from pzd.compiled import compiled
+
+@compiled
+def risen(x):
+    return x + 1.0
+
+@compiled
+def once(x):
+    return risen(x)
+
+@compiled
+def twice(x):
+    return risen(risen(x))
+
+assert {"once": once, "twice": twice}[sys.argv[1]](1.0) == {"once": 2.0, "twice": 3.0}[sys.argv[1]]
+inner = risen.inner
+(kept,) = inner.overloads.values()
+print(kept.library.get_pointer_to_function(kept.fndesc.llvm_func_name), sum(inner.stats.cache_hits.values()))
+"""
+
+
+def test_a_function_that_compiled_ones_call_is_machine_code_in_them_alone_and_is_kept_for_others(
+    tmp_path: Path,
+) -> None:
+    said = [_compile(tmp_path / "called.py", tmp_path / "cache", CALLED, asked=asked) for asked in ("once", "twice")]
+    assert [one.stderr for one in said] == ["", ""]
+    assert [one.stdout.split() for one in said] == [["0", "0"], ["0", "1"]]
+
+
 # --- The folder of the cache ---
 
 TYPED = """
@@ -172,10 +204,13 @@ print(sum(risen.outer.stats.cache_misses.values()), sum(risen.outer.stats.cache_
 """
 
 
-def _compile(script: Path, cache: Path, code: str = TYPED, **more: str) -> subprocess.CompletedProcess[str]:
-    script.write_text(code, encoding="utf-8")
+def _compile(
+    script: Path, cache: Path, code: str = TYPED, asked: str = "", **more: str
+) -> subprocess.CompletedProcess[str]:
+    if not script.exists() or script.read_text(encoding="utf-8") != code:  # numba keeps kernels by the file's time
+        script.write_text(code, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(cache), **more}
-    command = [sys.executable, script]
+    command = [sys.executable, script, asked]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 

@@ -16,9 +16,9 @@ from pzd.damper.curve import ForceCurve, curve_of
 from pzd.force_table.config import OneDamper
 from pzd.quantities import FORCE, VELOCITY, VOLTAGE, Control, Quantity
 from pzd.record import Array
+from pzd.rig.config import matching
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import own_quantity
-from pzd.rig.files.reading import matching
 from pzd.rig.files.sheet import Sheet, Wanted
 from pzd.rig.files.sniffing import Dialect, described, quantity_of, unit_of
 from pzd.rig.files.units import UnitError, to_canonical

@@ -23,6 +23,7 @@ from pzd.artefacts import Diagnosed, RecordEntry, Rig, Table
 from pzd.config import RunConfig, check_settings
 from pzd.own_effects import own_files
 from pzd.pipeline.stages import Stage
+from pzd.rig.config import matching
 from pzd.runs import Run, file_hash, versions
 from pzd.schema.errors import FilesError
 from pzd.schema.validate import read_json_list
@@ -267,8 +268,6 @@ def files_named(config: RunConfig, folder: Path) -> list[Path]:
 
 
 def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:
-    from pzd.rig.files.reading import matching
-
     paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     files = [file for value in paths for file in matching(folder, value)]
     files += _files_of_dampers(values, folder)
@@ -283,8 +282,6 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:
 
 def _files_of_dampers(values: Mapping[str, Any], folder: Path) -> Iterator[Path]:
     """Yield the files of `damper`: of curves, and those of other runs that its stage reads."""
-    from pzd.rig.files.reading import matching
-
     for path, value in values.items():
         if not path.startswith("damper.") or not isinstance(value, str):
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pzd.artefacts import (
     Characteristics,
@@ -26,15 +27,14 @@ from pzd.artefacts import (
 from pzd.artefacts.mounted import NOTES
 from pzd.config import control_of, read_config, validated
 from pzd.pipeline.command import Opened, stale_stages
-from pzd.pipeline.state_comparison import comparison_name, write_comparison
 from pzd.quantities import Control
-from pzd.report.damper_models import DamperModels
-from pzd.report.runs_page import ComparedRun, runs_page
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
 from pzd.schema.yamlfile import read_yaml
-from pzd.simulate.study.plan import assumed
+
+if TYPE_CHECKING:
+    from pzd.report.runs_page import ComparedRun
 
 
 @dataclass(frozen=True)
@@ -171,6 +171,9 @@ def compared_runs(found: Sequence[RunSummary]) -> tuple[ComparedRun, ...]:
 
 
 def _compared(found: RunSummary, name: str) -> ComparedRun:
+    from pzd.report.damper_models import DamperModels
+    from pzd.report.runs_page import ComparedRun
+
     run = Run(found.folder, found.folder / CONFIG, found.control)
     chosen = read_yaml(run.config).data.get("setting")
     has = {kind for kind in (Diagnosed, Table) if run.stage_folder(kind.folder).manifest is not None}
@@ -196,6 +199,9 @@ def write_runs_page(found: Sequence[RunSummary], warnings: Sequence[str]) -> Pat
     DataError : when a file of a run is at fault
     FilesError : when the disk does not take it, or another command is at work in the run
     """
+    from pzd.pipeline.state_comparison import comparison_name, write_comparison
+    from pzd.report.runs_page import runs_page
+
     page = runs_page(compared_runs(found), warnings)
     run = Run(found[-1].folder, found[-1].folder / CONFIG, found[-1].control)
     name = comparison_name(*(one.folder.resolve().name for one in found), between="--and--")[:_LONGEST_NAME]
@@ -212,6 +218,8 @@ def _mounted_of(given: Opened) -> MountedDampers | None:
 
 def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
     """Add what the config says of the numbers: what is stale, and what the rides assume."""
+    from pzd.simulate.study.plan import assumed
+
     if given.config.damper is not None:  # what the run of a rig left in the folder is none of this one
         nothing = RunSummary(
             found.folder, found.control, (), None, found.summary, found.comfort, found.page, found.marks

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import glob
 import re
 from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -286,3 +288,13 @@ class RigConfig(Frozen):
         if twice:
             raise ValueError(f"virtual: two records would be called {', '.join(twice)}; give each entry a setting")
         return self
+
+
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """Return the files that a path or glob pattern of the config names, seen from the config's folder."""
+    literal = folder / pattern
+    if literal.is_file():
+        return [literal]
+    whole = str(Path(glob.escape(str(folder))) / pattern)
+    found = [Path(path) for path in glob.glob(whole, recursive=True)]  # noqa: PTH207  # Path.glob takes no absolute patterns
+    return [path for path in found if path.is_file()]

@@ -5,7 +5,6 @@ listing -> layout -> format reader -> channels -> tests -> refusals -> clock -> 
 
 from __future__ import annotations
 
-import glob
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +28,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.record import Array, Record
-from pzd.rig.config import FilesEntry, Fixture, Limits
+from pzd.rig.config import FilesEntry, Fixture, Limits, matching
 from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
 from pzd.rig.files.child import end_child
 from pzd.rig.files.clock import clock_remarks
@@ -106,16 +105,6 @@ def _conflicts(found: Sequence[Listed]) -> list[str]:
             f"(got {earlier.entry.path!r} and {later.entry.path!r})"
         )
     return faults
-
-
-def matching(folder: Path, pattern: str) -> list[Path]:
-    """Return the files that a path or glob pattern of the config names, seen from the config's folder."""
-    literal = folder / pattern
-    if literal.is_file():
-        return [literal]
-    whole = str(Path(glob.escape(str(folder))) / pattern)
-    found = [Path(path) for path in glob.glob(whole, recursive=True)]  # noqa: PTH207  # Path.glob takes no absolute patterns
-    return [path for path in found if path.is_file()]
 
 
 # --- Records, and their names ---
