@@ -122,7 +122,7 @@ def laws() -> tuple[str, str]:
             "/* The laws of the damper and the path through them, translated from those that pzd computes with. */\n",
             '#ifndef LAWS_H\n#define LAWS_H\n\n#include "real.h"\n\n',
             *(f"#define {name} {size}\n" for name, size in sizes.items()),
-            f"#define TOLERANCE {number(TOLERANCE, SINGLE_TOLERANCE)} /* error of a piece, as a share of the force */\n\n",
+            f"#define TOLERANCE {number(TOLERANCE, SINGLE_TOLERANCE)} /* of a piece, as a share of the force */\n\n",
             "typedef struct { real at[ROW]; } row;\n",
             written.types(),
             "\nreal least(real one, real other);\nreal most(real one, real other);\n",
