@@ -94,6 +94,13 @@ SHARED: tuple[Callable[..., object], ...] = (
 """Functions of pzd that `sources/element.c` calls; what these call is translated with them."""
 
 
+SINGLE_TOLERANCE = 3e-6
+"""Admissible error of a piece in single precision, as a share of the force: 25 roundings, as many as a piece makes."""
+_SINGLES = {"pzd.damper.regimes._DIFFERENCE": 0.03}
+"""Constants of the march that single precision needs otherwise: over this share of a step, with moving parameters, the
+rounding of a force is within the tolerance of its change."""
+
+
 @cache
 def laws() -> tuple[str, str]:
     """Write `laws.h` and `laws.c`: every law of the damper and the march along its path, as pzd computes them.
@@ -102,7 +109,7 @@ def laws() -> tuple[str, str]:
     ------
     ConfigError : when a law uses what C has no counterpart for
     """
-    written = Translation(ROW, kernels, frozenset([path.Sensitivities]))
+    written = Translation(ROW, kernels, frozenset([path.Sensitivities]), _SINGLES)
     try:
         for function in SHARED:
             written.add(function)
@@ -115,7 +122,7 @@ def laws() -> tuple[str, str]:
             "/* The laws of the damper and the path through them, translated from those that pzd computes with. */\n",
             '#ifndef LAWS_H\n#define LAWS_H\n\n#include "real.h"\n\n',
             *(f"#define {name} {size}\n" for name, size in sizes.items()),
-            f"#define TOLERANCE {number(TOLERANCE)} /* admissible error of a piece, as a share of the force */\n\n",
+            f"#define TOLERANCE {number(TOLERANCE, SINGLE_TOLERANCE)} /* of a piece, as a share of the force */\n\n",
             "typedef struct { real at[ROW]; } row;\n",
             written.types(),
             "\nreal least(real one, real other);\nreal most(real one, real other);\n",

@@ -96,6 +96,8 @@ class Translation:
     """Module whose annotations declare the functions that have none of their own."""
     absent: frozenset[type] = frozenset()
     """Types of arguments that the C does without, together with every branch that asks them."""
+    singles: Mapping[str, float] = field(default_factory=dict)
+    """What some constants, `module.name`, are in single precision."""
     structs: dict[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     """Type and name of each field by the name of the structure."""
     functions: dict[str, str] = field(default_factory=dict)
@@ -213,8 +215,10 @@ class Translation:
         )
 
 
-def number(value: float) -> str:
-    """Write a number for either precision."""
+def number(value: float, single: float | None = None) -> str:
+    """Write a number for either precision, where need be one for single precision."""
+    if single is not None:
+        return f"EITHER({float(value)!r}, {float(single)!r})"
     if math.isnan(value) or math.isinf(value):
         return "R_NAN" if math.isnan(value) else f"{'-' if value < 0.0 else ''}R_INFINITY"
     if 0.0 < abs(value) < LEAST_LENGTH:
@@ -444,7 +448,9 @@ class _Body:
         if isinstance(value, bool | int):
             return _Code(str(int(value)), INT)
         if isinstance(value, float):
-            return _Code(number(value), REAL, _UNARY if value < 0.0 else _CALL)
+            name = f"{self.function.__globals__['__name__']}.{node.id}" if isinstance(node, ast.Name) else ""
+            written = number(value, self.into.singles.get(name))
+            return _Code(written, REAL, _UNARY if value < 0.0 else _CALL)
         if isinstance(value, tuple) and value and all(isinstance(one, float | int) for one in value):
             entries = [self.constant(one, node) for one in value]
             kind = self.into.pair([one.kind for one in entries])

@@ -36,6 +36,9 @@ QUICK = ("plain", "rounded", "lag", "thinning", "hysteresis", "pocket", "frame")
 AT_LIMITS = ("elasto-plastic", "rigid", "stiff")
 """Under a constant control signal our own closed form is exact there, while the march, and C with it, is just off the
 limit, and a sample on the very reversal may show either side of the jump; test_fmu.py has them on inputs that vary."""
+SINGLE = 3e-4
+"""Largest difference of single precision, as a share of the peak: a hundred pieces at their tolerance, as many as lie
+within the time in which the oil forgets, where the control signal moves in every step."""
 ALL = [
     name if name in QUICK else pytest.param(name, marks=pytest.mark.ci) for name in EXPORTED if name not in AT_LIMITS
 ]
@@ -78,11 +81,11 @@ def test_c_has_our_force_to_a_millionth_of_the_peak(name: str, rng: np.random.Ge
 
 @needs_gcc
 @pytest.mark.parametrize("name", ALL)
-def test_c_of_single_precision_has_it_to_half_a_percent(name: str, rng: np.random.Generator) -> None:
+def test_c_of_single_precision_has_it_to_a_few_ten_thousandths(name: str, rng: np.random.Generator) -> None:
     content = content_of(EXPORTED[name])
     run = by_program(formats()["c-dynamics"].files(content), "-DDAMPER_SINGLE")
     found = shares(content, run, False, rng)
-    assert max(found.values()) <= 5e-3, found
+    assert max(found.values()) <= SINGLE, found
 
 
 @needs_gcc
