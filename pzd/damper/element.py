@@ -86,8 +86,7 @@ def element_forces(displacement: Array, step: float, elements: Array) -> Array:
     (m, n) force [N]
     """
     forces = np.empty((len(elements), displacement.size))
-    for (friction, damping, stiffness), force in zip(elements, forces, strict=True):
-        _march(displacement, _STRAIGHT, np.array([step]), friction, damping, stiffness, 0.0, force, _NO_SLOPES, 1)
+    _march_many(displacement, _STRAIGHT, np.array([step]), elements, forces, _NO_SLOPES)
     return forces
 
 
@@ -230,6 +229,13 @@ def _march(
             side = _side(end, T0)
         F = end
         force[row] = F
+
+
+@compiled
+def _march_many(x: Array, v: Array, steps: Array, elements: Array, forces: Array, slopes: Array) -> None:
+    """Fill the forces (m, n) of elements (m, 3), each from zero; `slopes` are empty."""
+    for i in range(len(elements)):
+        _march(x, v, steps, elements[i, 0], elements[i, 1], elements[i, 2], 0.0, forces[i], slopes, 1)
 
 
 @inlined

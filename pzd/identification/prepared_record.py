@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles, cycles_of
 from pzd.signals.jumps import jumps, jumps_in_cycles, unresolved_flanks
-from pzd.signals.kinematics import kinematics
+from pzd.signals.kinematics import clean_displacement_of
 from pzd.signals.measures import REVERSAL_SHARE, reversals
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 from pzd.signals.period import moving_range
@@ -86,7 +86,8 @@ def prepare(record: Record) -> PreparedRecord:
     time, factor, positions = _fine_time(record)
     return PreparedRecord(
         record.name,
-        _on_fine_grid(_clean_displacement(record), record, time, even=positions is None),
+        # Without its noise, which a stiff oil spring would turn into force.
+        _on_fine_grid(clean_displacement_of(record), record, time, even=positions is None),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
@@ -94,11 +95,6 @@ def prepare(record: Record) -> PreparedRecord:
         np.where(unresolved_flanks(record.force, reversals(record.displacement), record.rate), 0.0, 1.0),
         positions,
     )
-
-
-def _clean_displacement(record: Record) -> Array:
-    """Return the displacement (n,) without its noise, which a stiff oil spring would turn into force [m]."""
-    return kinematics(record.time, record.displacement, cycles_of(record)).displacement
 
 
 def _on_fine_grid(displacement: Array, record: Record, time: Array, *, even: bool) -> Array:

@@ -24,7 +24,10 @@ from pzd.signals.splines import cubic
 FITTED_POINTS = 1000
 """Fewest points of a cycle in the fit of the period, as far as there are samples."""
 REFINEMENTS = 6
-"""Rounds of the refinement of the period; each squares the error."""
+"""Most rounds of the refinement of the period; each squares the error."""
+SETTLED = 1e-8
+"""Shift from cycle to cycle, as a share of the period, at which the refinement ends: a thousandth of the distance of
+two samples over a hundred cycles of a thousand."""
 CORNER = 3
 """Points at either end of the cycle left out of the fit of the period: there may be the corner of a start from rest."""
 MAINS_BAND = 0.5
@@ -236,7 +239,10 @@ def _fitted_period(time: Array, coarse: Array, displacement: Array, found: Perio
     course = cubic(coarse, displacement)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
-        run = _whole_cycles(time, found, run.period + _shift_per_cycle(used, course(used.instants(coarse))))
+        shift = _shift_per_cycle(used, course(used.instants(coarse)))
+        run = _whole_cycles(time, found, run.period + shift)
+        if used.count == run.count and abs(shift) < SETTLED * run.period:
+            break
     return run
 
 
@@ -281,8 +287,9 @@ def drift_over_cycles(folded: Array) -> Array:
     order = np.arange(len(folded)) - (len(folded) - 1) / 2.0
     degree = min(order.size - 1, 2)
     phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
-    course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
-    return np.asarray(course(order[:, None] + phase))
+    powers = np.vander(order / order[-1], degree + 1)
+    coefficients = np.linalg.lstsq(powers, folded.mean(axis=1), rcond=None)[0]
+    return np.polyval(coefficients, (order[:, None] + phase) / order[-1])
 
 
 # --- Edges of the run ---

@@ -7,12 +7,13 @@ Where cycles repeat, the average cycle is differentiated, without its noise and 
 from __future__ import annotations
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pzd.record import Array
+from pzd.record import Array, Record
 from pzd.signals.average_cycle import AverageCycle
-from pzd.signals.cycles import Cycles
+from pzd.signals.cycles import Cycles, cycles_of
 from pzd.signals.measures import resolution, usual_step
 from pzd.signals.smoothing import HIGHEST, low_pass, without_steps
 from pzd.signals.splines import even_derivatives, is_even
@@ -43,18 +44,36 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
     inside the run from the average cycle plus a slow drift, outside from the smoothed displacement
     """
     if run is None:
-        return _smoothed_motion(time, displacement, np.inf)
+        return _smoothed_motion(time, displacement, resolution(displacement))
     inside = run.inside(time)
     average = AverageCycle.of(time, displacement, run)
     cyclic = Kinematics(*average.motion(average.clear_harmonics)(time[inside]))
-    drift = _smoothed_motion(time[inside], displacement[inside] - cyclic.displacement, DRIFT_CORNER * run.frequency)
+    departure, corner = displacement[inside] - cyclic.displacement, DRIFT_CORNER * run.frequency
+    drift = _smoothed_motion(time[inside], departure, 0.0, corner)
     repeating = Kinematics(*(one + other for one, other in zip(cyclic, drift, strict=True)))
     if inside.all():
         return repeating
-    motion = _smoothed_motion(time, displacement, np.inf)
+    motion = _smoothed_motion(time, displacement, resolution(displacement))
     for whole, part in zip(motion, repeating, strict=True):
         whole[inside] = part
     return motion
+
+
+_clean_by_record: WeakKeyDictionary[Record, Array] = WeakKeyDictionary()
+"""Displacements without noise found so far; an entry goes with its record."""
+
+
+def clean_displacement_of(record: Record) -> Array:
+    """Return the displacement (n,) of a record without its noise [m], found once; see `kinematics`."""
+    if record not in _clean_by_record:
+        found = kinematics(record.time, record.displacement, cycles_of(record)).displacement
+        remember_clean_displacement(record, found)
+    return _clean_by_record[record]
+
+
+def remember_clean_displacement(record: Record, clean: Array) -> None:
+    """Store the displacement (n,) without noise that was found elsewhere, perhaps in another process [m]."""
+    _clean_by_record[record] = clean
 
 
 def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
@@ -75,14 +94,13 @@ def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
     return np.asarray(np.interp(time, knots, np.concatenate(([first], mean, [last]))))
 
 
-def _smoothed_motion(time: Array, displacement: Array, highest: float) -> Kinematics:
-    """Smooth the displacement by cross-validation, with a corner of at most `highest` [Hz]."""
+def _smoothed_motion(time: Array, displacement: Array, finest: float, highest: float = np.inf) -> Kinematics:
+    """Smooth a displacement of steps `finest` [m] by cross-validation, with a corner of at most `highest` [Hz]."""
     steps = np.diff(time)
     step = max(usual_step(time), float(time[-1] - time[0]) / (4.0 * time.size))
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)
-    finest = resolution(displacement)
     smooth = low_pass(without_steps(values, finest), min(2.0 * np.pi * highest * step, HIGHEST))
     if regular and is_even(time):
         speed, acceleration = even_derivatives(smooth)

@@ -26,10 +26,6 @@ _STANDS_OUT = 3.0
 """Multiple of ln(n) times the mean that no power of white noise exceeds: of n powers one does so in n^2 records."""
 
 
-_LONG = 131_072
-"""Samples from which the memory and time of a transform matter."""
-
-
 def low_pass(values: Array, highest: float) -> Array:
     """Smooth a signal on a regular grid by a spline of the sixth order, its corner chosen by cross-validation.
 
@@ -66,14 +62,22 @@ def motion_below(values: Array) -> float:
 
 def without_steps(values: Array, step: float) -> Array:
     """Return a channel (n,) on a regular grid without the lines that hold no more than its steps add."""
-    return cut_above(values, resolved_below(values, step))[0] if step > 0.0 else values
+    if step <= 0.0:
+        return values
+    line, spectrum, _ = _reflected(values)
+    spectrum[_resolved_lines_of(spectrum, step) + 1 :] = 0.0
+    return np.asarray(np.fft.irfft(spectrum, 2 * (line.size - 1))[: values.size] + line[: values.size])
 
 
 def resolved_below(values: Array, step: float) -> float:
     """Return the frequency above which a channel (n,) holds no more than its steps add [rad/sample]."""
-    odd, _ = _reflected_odd(values)
-    power = np.abs(np.fft.rfft(odd)) ** 2 * (2.0 / odd.size**2)
-    return min(resolved_lines(power, step) * (2.0 * np.pi / odd.size), np.pi)
+    line, spectrum, _ = _reflected(values)
+    return min(_resolved_lines_of(spectrum, step) * np.pi / (line.size - 1), np.pi)
+
+
+def _resolved_lines_of(spectrum: Complex, step: float) -> int:
+    """Return the number of the first lines (m,) of a reflected channel that hold more than its steps add."""
+    return resolved_lines(np.abs(spectrum) ** 2 * (0.5 / (spectrum.size - 1) ** 2), step)
 
 
 def resolved_lines(power: Array, step: float) -> int:
@@ -85,25 +89,18 @@ def resolved_lines(power: Array, step: float) -> int:
     return int(np.searchsorted(-beyond, -(step**2) / 12.0))
 
 
-def _reflected_odd(displacement: Array) -> tuple[Array, Array]:
-    """Return a displacement (n,) less the line through its ends, continued by its point reflection, and the line."""
-    line = np.linspace(displacement[0], displacement[-1], displacement.size)
-    odd = displacement - line
-    return np.concatenate([odd, -odd[:0:-1]]), line
-
-
 def cut_above(displacement: Array, corner: float) -> tuple[Array, float]:
     """Return a displacement (n,) without what is above a corner [rad/sample], and its noise [m].
 
     The noise is that of the octave above the corner, where what the motion loses is counted with it.
     """
-    odd, line = _reflected_odd(displacement)
-    spectrum = np.fft.rfft(odd)
-    frequency = np.arange(spectrum.size) * (2.0 * np.pi / odd.size)
+    line, spectrum, _ = _reflected(displacement)
+    size = 2 * (line.size - 1)
+    frequency = np.arange(spectrum.size) * (2.0 * np.pi / size)
     octave = spectrum[(frequency > corner) & (frequency <= 2.0 * corner)]
     spectrum[frequency > corner] = 0.0
-    noise = float(np.sqrt(np.mean(np.abs(octave) ** 2) / odd.size)) if octave.size else 0.0
-    return np.fft.irfft(spectrum, odd.size)[: line.size] + line, noise
+    noise = float(np.sqrt(np.mean(np.abs(octave) ** 2) / size)) if octave.size else 0.0
+    return (np.fft.irfft(spectrum, size)[: displacement.size] + line[: displacement.size]), noise
 
 
 # --- Corner by cross-validation ---
@@ -119,17 +116,15 @@ def _reflected(values: Array) -> tuple[Array, Complex, Array]:
 
 
 def _of_fast_length(values: Array) -> Array:
-    """Continue a long signal by its point reflection, as far as its transform needs to be of a fast length.
+    """Continue a signal by its point reflection, as far as its transform needs to be of a fast length.
 
-    Another length, of large prime factors, takes ten times the memory and up to ten times as long. What is added, at
-    most 3 %, is what the reflection puts there anyway.
+    Another length, of large prime factors, takes up to ten times as long and as much memory. What is added, of long
+    signals at most 3 %, is what the reflection puts there anyway.
     """
-    if values.size < _LONG:
-        return values
     from scipy.fft import next_fast_len
 
     more = int(next_fast_len(values.size - 1, real=True)) + 1 - values.size
-    return np.concatenate((values, 2.0 * values[-1] - values[-2 : -2 - more : -1]))
+    return np.concatenate((values, 2.0 * values[-1] - values[-2 : -2 - more : -1])) if more else values
 
 
 def _corner(s: Array, power: Array, highest: float) -> float:
@@ -144,7 +139,7 @@ def _corner(s: Array, power: Array, highest: float) -> float:
     binned, counts = np.add.reduceat(power, edges), np.diff(np.append(edges, s.size))
     middle = np.add.reduceat(s, edges) / counts
     corners = np.geomspace(min(np.pi / s.size, highest), highest, _CORNERS)
-    taken = 1.0 / (1.0 + (corners[:, None] / middle[None, :]) ** 6)
+    taken = 1.0 / (1.0 + np.outer(corners**6, middle**-6.0))
     found = float(corners[_least_score(taken, binned, counts)])
     for halvings in range(1, _HALVINGS + 1):
         limit = s[-1] / 2.0**halvings

@@ -271,6 +271,29 @@ def test_a_force_that_saturates_below_the_noise_is_told_with_what_is_missing(
     assert np.mean([cut == hard for _, cut in missing]) >= 0.8
 
 
+def test_a_force_that_bends_over_a_little_is_told_where_half_of_it_is_friction(rng: np.random.Generator) -> None:
+    """A fifth of the peak is missing, and a third of C; a Bingham element leaves half a percent of peak of it."""
+    missing = []
+    for one in rng.spawn(2 * FEWER):
+        damper = drawn(one, friction=float(one.uniform(0.4, 0.6)))
+        peak = float(np.abs(damper.force).max())
+        shown = 1.15 * peak * np.tanh(damper.force / (1.15 * peak))
+        record = replace(damper, noise=1e-3 * peak).recorded(one, shown)
+        missing += [f.size / (peak - np.abs(shown).max()) for f in sizes([record], amplifier) if f.check == "range"]
+    assert len(missing) >= FEWER
+    assert np.median(missing) == pytest.approx(1.0, rel=0.3)
+
+
+def test_no_range_ends_where_a_stiff_damper_is_sampled_coarsely(rng: np.random.Generator) -> None:
+    """The first grid is coarse there: what finds the right element first is no reason to tell of an amplifier."""
+    for one in rng.spawn(3 * FEWER):
+        damper = drawn(one, friction=float(one.choice([0.5, 0.98])))
+        sampled = replace(
+            damper, rate=damper.rate / 4.0, **{n: getattr(damper, n)[::4] for n in ("time", "x", "force")}
+        )
+        assert sizes([sampled.recorded(one)], amplifier) == []
+
+
 def entry(name: str, size: float | None, check: str, force: float = 100.0) -> RecordEntry:
     """The entry of a record with one finding, or none."""
     told = () if size is None else (Finding(check=check, where="force", size=size, unit="Hz", follows=""),)

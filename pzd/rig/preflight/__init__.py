@@ -22,7 +22,7 @@ from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
 from pzd.signals.cycles import Cycles, remember_cycles
-from pzd.signals.kinematics import Kinematics
+from pzd.signals.kinematics import Kinematics, remember_clean_displacement
 from pzd.signals.measures import reversals, work
 
 
@@ -112,7 +112,7 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
 
     def examine(
         make: Callable[[], PreflightRecord],
-    ) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
+    ) -> tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]:
         test = make()
         record, run = test.record, test.cycles
         entry = RecordEntry(
@@ -131,13 +131,14 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
             findings=findings(test) if preflight else (),
             removed=test.removed,
         )
-        return record, run, entry, test.ingested
+        return record, run, test.clean.displacement, entry, test.ingested
 
     results = parallel_map(examine, tests, jobs)
-    # Records were made in other processes, whose memory of the cycles is lost here.
-    for record, cycles, _, _ in results:
+    # Records were made in other processes, whose memory of the cycles and the clean motion is lost here.
+    for record, cycles, clean, _, _ in results:
         remember_cycles(record, cycles)
-    entries = tuple(entry for _, _, entry, _ in results)
+        remember_clean_displacement(record, clean)
+    entries = tuple(entry for *_, entry, _ in results)
     for family in families():
         for compare in getattr(family, "COMPARISONS", ()):
             entries = compare(entries)

@@ -12,16 +12,24 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import butter, lfilter, lfilter_zi
 
 from pzd.artefacts import Finding, RecordEntry
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
-from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, sampled_fit
+from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
 from pzd.rig.preflight.sensors import coarse_step
+from pzd.signals.cycles import MEDIAN_OF_NORMAL
 
 WORTH = 3e-4
-"""Share of the force's squares from which something is left to explain; the grid of the reference leaves a tenth."""
+"""Share of the force's squares, beyond noise, from which a low-pass is looked for; the grid of the reference leaves a
+tenth."""
+WORTH_OF_RANGE = 4e-5
+"""The same for a range that ends.
+
+Reason: half of what is left where friction is half of the peak and a fifth of the peak is missing, so that C is a third
+too low; the grid, once closer, leaves less than a quarter of it."""
+CLEAR = 5.0
+"""Standard errors of the noise's share that a residual exceeds it by: one of the dozens of ranges always fits some."""
 EXPLAINS = 0.25
 """What the channel does has to leave less than this share of what the reference leaves without it."""
 
@@ -30,16 +38,40 @@ def amplifier(test: PreflightRecord) -> Iterator[Finding]:
     """Find what a channel does to the whole force, where it explains most of what the reference leaves."""
     if not is_constant(test.record, voltage_scale([test.record])) or coarse_step(test.record.displacement):
         return
-    section, plain = sampled_fit(test)
-    if plain.residual < WORTH:
+    # The average cycle has less noise: where it leaves nothing to explain, the samples need no fit.
+    if test.cycles is not None and reference_fit(test)[1].residual < WORTH_OF_RANGE:
         return
-    found = [_low_pass(section, plain, test.cycles.frequency if test.cycles else 1.0), _saturation(section)]
-    left, finding = min(found, key=lambda one: one[0])
-    if finding is None or left >= EXPLAINS * plain.residual:
+    section, plain = sampled_fit(test)
+    noise = _noise(test, section)
+    chance = CLEAR * noise * np.sqrt(2.0 / np.count_nonzero(section.shown))
+    if plain.residual - noise < max(WORTH_OF_RANGE, chance):
+        return
+    found = [_saturation(section)]
+    if plain.residual - noise >= WORTH:
+        found.append(_low_pass(section, plain, test.cycles.frequency if test.cycles else 1.0))
+    best, finding = min(found, key=lambda one: one[0].residual)
+    if finding is None:
+        return
+    # The same element, and those near it, without what the channel does: the plain search may have missed them.
+    without = fit_element(section, section.force[None], start=(best.friction_extension, best.lag)).residual
+    beyond, left = min(plain.residual, without) - noise, best.residual
+    if beyond < max(WORTH_OF_RANGE, chance) or left - noise >= EXPLAINS * beyond:
         return
     if finding.check == "filter" and _rounded_yield(section) < max(left, WORTH):
         return
     yield finding
+
+
+def _noise(test: PreflightRecord, section: Section) -> float:
+    """Return the noise as a share of the force's squares, from the differences of adjacent cycles; 0 without cycles.
+
+    By their median: where a rigid damper turns, its force jumps at another sample in each cycle.
+    """
+    if test.cycles is None:
+        return 0.0
+    apart = np.diff(test.cycles.fold(test.record.time, test.record.force), axis=0)
+    deviation = float(np.median(np.abs(apart))) / MEDIAN_OF_NORMAL
+    return 0.5 * deviation**2 * np.count_nonzero(section.shown) / section.squares
 
 
 # --- A low-pass of the force ---
@@ -58,7 +90,7 @@ LEAST_RECORDS = 1.0 / 3.0
 """nor is what fewer than this share of the records show: only a force without friction hides it."""
 
 
-def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[float, Finding | None]:
+def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[ReferenceFit, Finding | None]:
     """Fit a low-pass of the force behind the element; of itself that turns within a sample, or an oil spring's travel.
 
     Equation: F = H(s) (F_0 + k f(T0/k, C/k) + c_1 x + c_2 a), H Butterworth's     Source: least squares
@@ -70,16 +102,16 @@ def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[fl
 
     Returns
     -------
-    the share of the squares that is left, and what to say of it
+    the element behind it, and what to say of it
     """
     corners = np.geomspace(slowest, max(0.1 / section.step, 2.0 * slowest), CORNERS)
     tried = [(_behind(section, order, corner), order, corner) for order in ORDERS for corner in corners]
     best, order, corner = min(tried, key=lambda one: one[0].residual)
     if best.residual > 2.0 * EXPLAINS * plain.residual:
-        return best.residual, None
+        return best, None
     nearer = corner * (corners[1] / corners[0]) ** np.linspace(-1.0, 1.0, CLOSER)
     best, corner = min(((_behind(section, order, one, 2), one) for one in nearer), key=lambda one: one[0].residual)
-    return best.residual, Finding(
+    return best, Finding(
         check="filter",
         where=f"force, the whole record, as behind a low-pass of {'first' if order == 1 else 'second'} order",
         size=float(corner),
@@ -114,6 +146,8 @@ def _rounded_yield(section: Section) -> float:
 
 def _behind(section: Section, order: int, corner: float, zooms: int = 1) -> ReferenceFit:
     """Fit the element behind a low-pass."""
+    from scipy.signal import butter, lfilter, lfilter_zi  # half a second, and few records come so far
+
     b, a = butter(order, min(2.0 * corner * section.step, 0.9))
     start = lfilter_zi(b, a)
 
@@ -139,15 +173,21 @@ def drop_contradicting_filters(entries: tuple[RecordEntry, ...]) -> tuple[Record
 
 SATURATES_AT = (1.01, 1.02, 1.04, 1.07, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0)
 """Where a soft amplifier saturates, as multiples of the largest force that it shows."""
+CLOSER_LIMITS = 1.15
+"""Factor about the best of them within which it is looked for more closely."""
+CLOSEST = 4
+"""Zooms of the grid at the best range: as many as of the reference without one."""
 CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.35)
 """Shares of the samples, at either end, that may be cut off: of more, friction alone is flat too."""
 LEAST_BETWEEN = 20
 """Fewest samples between the ends, for the four columns of the reference."""
-LEAST_CUT = 0.03
-"""Least share of the force shown that is missing at the peak."""
+LEAST_CUT, LARGEST_CUT = 0.03, 1.0
+"""Least and largest share of the force shown that is missing at the peak.
+
+Reason: a load cell is good to less than the least; of a force that stays flat any amount might be missing."""
 
 
-def _saturation(section: Section) -> tuple[float, Finding | None]:
+def _saturation(section: Section) -> tuple[ReferenceFit, Finding | None]:
     """Fit a force that bends over or is cut off near its peaks, with noise on top of it.
 
     Equation: F = F_s tanh(f / F_s), or F = f between two limits, f the element beside offset, spring, inertia
@@ -159,15 +199,21 @@ def _saturation(section: Section) -> tuple[float, Finding | None]:
 
     Returns
     -------
-    the share of the squares that is left, and what to say of it
+    the element in front of it, and what to say of it
     """
     peak = float(np.abs(section.force).max())
-    soft = [(*_bent(section, share * peak), False) for share in SATURATES_AT]
-    hard = [(*_cut(section, share), True) for share in CUT_SHARES]
-    left, missing, cut = min(soft + hard)
-    if missing < LEAST_CUT * peak:
-        return left, None
-    return left, Finding(
+    soft_left, soft = min((_bent(section, share * peak)[0].residual, share) for share in SATURATES_AT)
+    hard_left, hard = min((_cut(section, share)[0].residual, share) for share in CUT_SHARES)
+    cut = hard_left < soft_left
+    if cut:
+        best, missing = _cut(section, hard, CLOSEST)
+    else:
+        closer = np.maximum(soft * np.geomspace(1.0 / CLOSER_LIMITS, CLOSER_LIMITS, CLOSER), SATURATES_AT[0])
+        tried = [_bent(section, float(share) * peak, CLOSEST) for share in closer]
+        best, missing = min(tried, key=lambda one: one[0].residual)
+    if not LEAST_CUT * peak <= missing <= LARGEST_CUT * peak:
+        return best, None
+    return best, Finding(
         check="range",
         where=f"force, {'cut off' if cut else 'bends over'} near {peak:.4g} N, with noise on top",
         size=missing,
@@ -177,28 +223,28 @@ def _saturation(section: Section) -> tuple[float, Finding | None]:
     )
 
 
-def _bent(section: Section, limit: float) -> tuple[float, float]:
-    """Return the share of the squares left by a soft amplifier of a limit [N], and what is missing at the peak [N]."""
+def _bent(section: Section, limit: float, zooms: int = 2) -> tuple[ReferenceFit, float]:
+    """Return the element in front of a soft amplifier of a limit [N], and what is missing at the peak [N]."""
     shown = np.clip(section.force / limit, -0.9999, 0.9999)
     straight = limit * np.arctanh(shown)
-    fit = fit_element(replace(section, weights=1.0 - shown**2), straight[None], 2)
-    return fit.residual, float(np.abs(straight).max() - np.abs(section.force).max())
+    fit = fit_element(replace(section, weights=1.0 - shown**2), straight[None], zooms)
+    return fit, float(np.abs(straight).max() - np.abs(section.force).max())
 
 
-def _cut(section: Section, share: float) -> tuple[float, float]:
-    """Return the share of the squares left where so many samples are cut off at each end, and what is missing [N]."""
+def _cut(section: Section, share: float, zooms: int = 2) -> tuple[ReferenceFit, float]:
+    """Return the element where so many samples are cut off at each end, and what is missing there [N]."""
     force = section.force
     low, high = np.quantile(force[section.shown], (share, 1.0 - share))
     ends = [section.shown & (force >= high), section.shown & (force <= low)]
     between = replace(section, shown=section.shown & (force < high) & (force > low))
     if np.count_nonzero(between.shown) < LEAST_BETWEEN:
-        return np.inf, 0.0
-    fit = fit_element(between, force[None], 2)
+        return ReferenceFit(np.inf, np.inf, 0, 1.0, 1.0), 0.0
+    fit = fit_element(between, force[None], zooms)
     design = columns(between, fit)
     whole = design @ np.linalg.lstsq(design[between.shown], force[between.shown], rcond=None)[0]
     flat = sum(float(np.sum((force[rows] - np.median(force[rows])) ** 2)) for rows in ends)
     missing = min(float(np.max(sign * (whole - force)[rows])) for sign, rows in zip((1.0, -1.0), ends, strict=True))
-    return (fit.residual * between.squares + flat) / section.squares, missing
+    return replace(fit, residual=(fit.residual * between.squares + flat) / section.squares), missing
 
 
 def drop_contradicting_ranges(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:

@@ -33,6 +33,12 @@ BESIDE_REVERSAL = (-1, 0, 1, 2)
 """Samples about a reversal at which the force of a rigid damper is between its two signs."""
 LEAST_RESIDUAL = 2e-3
 """Share of the force's squares worth explaining: less is noise, or how coarse the element is."""
+AGAIN = 1e-4
+"""Share of the force's squares left at which the search begins again elsewhere: at a C / k on the other side of a
+sample, and at another T0 / k.
+
+Reason: what is shorter than a sample looks alike, and the best point of the coarse first grid may lie in a wrong
+valley."""
 RIGID = 1e-5
 """Least T0 / k that is tried, as a share of half the stroke: the flank then takes less than a sample."""
 PROMPT = 1e-5
@@ -76,7 +82,8 @@ class Section:
 
     def counted(self, rows: Array) -> Array:
         """Return the samples that count of (m, n) rows, with their weights."""
-        return np.asarray((rows * self.weights)[:, self.shown])
+        weighed = rows if isinstance(self.weights, float) and self.weights == 1.0 else rows * self.weights
+        return weighed if self.shown.all() else np.asarray(weighed[:, self.shown])
 
     def recorded(self, rows: Array) -> Array:
         """Return what the channel of the force shows of (m, n) forces."""
@@ -101,6 +108,10 @@ class ReferenceFit:
     def explains(self) -> bool:
         """Whether the element takes more than half of a visible residual; else its parameters mean nothing."""
         return self.residual_without_element > LEAST_RESIDUAL and self.residual < 0.5 * self.residual_without_element
+
+
+_Found = tuple[float, int, tuple[float, float]]
+"""What is left, the index of the force, and the element."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +178,9 @@ def _first_cycles(test: PreflightRecord) -> Section:
     return Section(every / record.rate, x, delayed, shown)
 
 
-def fit_element(section: Section, forces: Array, zooms: int = _ZOOMS) -> ReferenceFit:
+def fit_element(
+    section: Section, forces: Array, zooms: int = _ZOOMS, start: tuple[float, float] | None = None
+) -> ReferenceFit:
     """Fit a Bingham element beside a free offset, spring and inertia, by a grid search that zooms in.
 
     Parameters
@@ -175,26 +188,42 @@ def fit_element(section: Section, forces: Array, zooms: int = _ZOOMS) -> Referen
     section : the displacement, what the channel shows, and which samples count
     forces : (m, n) [N]; the fit is that of the force that is explained best
     zooms : how often the grid becomes finer
+    start : T0 / k [m] and C / k [s] about which is searched alone; None for everywhere
     """
     free = _free_terms(section)
     rest = _projected_out(section.counted(forces), free)
     targets = _normalised(rest)
     unexplained: Array = np.sum(rest**2, axis=1) / section.squares
 
-    def closest(elements: Array) -> tuple[int, int, float]:
-        """Return the indices of the best element and force, and the share of the squares that is left."""
-        left = unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
+    def left_by(elements: Array) -> Array:
+        """Return the share (g, m) of the squares that is left of each force by each element (g, s)."""
+        return np.asarray(unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2))
+
+    def closest(left: Array, grid: _Grid) -> _Found:
         element, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
-        return element, force, float(left[element, force])
+        return float(left[element, force]), force, grid.pairs[element]
+
+    def zoomed(best: _Found, steps: tuple[float, float]) -> _Found:
+        for _ in range(zooms):
+            spans = [(np.log(v) - step, np.log(v) + step) for v, step in zip(best[2], steps, strict=True)]
+            grid = _grid(section, spans, _ZOOM)
+            best, steps = min(best, closest(left_by(grid.forces), grid)), grid.steps
+        return best
 
     grid = _first_grid(section)
-    element, force, left = closest(grid.forces)
-    best = left, force, grid.pairs[element]
-    for _ in range(zooms):
-        spans = [(np.log(v) - step, np.log(v) + step) for v, step in zip(best[2], grid.steps, strict=True)]
-        grid = _grid(section, spans, _ZOOM)
-        element, force, left = closest(grid.forces)
-        best = min(best, (left, force, grid.pairs[element]))
+    if start is not None:
+        best = zoomed((np.inf, 0, start), grid.steps)
+        return ReferenceFit(best[0], float(unexplained[best[1]]), best[1], *best[2])
+    left = left_by(grid.forces)
+    first = closest(left, grid)
+    best = zoomed(first, grid.steps)
+    if best[0] > AGAIN:
+        frictions, lags = np.transpose(grid.pairs)
+        same_side = (lags < section.step) == (first[2][1] < section.step)
+        near = np.abs(np.log(frictions / first[2][0])) < 1.5 * grid.steps[0]
+        for tried in (same_side, near):
+            if not tried.all():
+                best = min(best, zoomed(closest(np.where(tried[:, None], np.inf, left), grid), grid.steps))
     return ReferenceFit(best[0], float(unexplained[best[1]]), best[1], *best[2])
 
 
