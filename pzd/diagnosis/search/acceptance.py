@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,13 +19,17 @@ from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
-from pzd.diagnosis.search.candidates import Candidate, starts_of, towards_neutral
+from pzd.diagnosis.search.candidates import Candidate, late_instead_of_elastic, starts_of, towards_neutral
 from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
 from pzd.record import Array
 
 WITHIN_TEST_SCATTER = "so small that it counts as an offset or a delay of the tests"
 MAY_BE_TEST_SCATTER = "would fit better, and may be no more than an offset or a delay that each test has of its own"
 MAY_BE_CHANCE = "would fit better, though not by so much that chance is out of the question"
+LATE_OR_ELASTIC = (
+    "would fit as well in the place of the oil spring: neither the flank of the yield nor the frequencies of these "
+    "tests tell a force that is recorded late from a soft oil spring; tests at frequencies farther apart would"
+)
 
 
 def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
@@ -106,6 +110,31 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     if not sizes or max(size - width for size, width in sizes) >= 1.0:
         return None
     return MAY_BE_TEST_SCATTER if max(size for size, _ in sizes) >= 1.0 else WITHIN_TEST_SCATTER
+
+
+def late_or_elastic(problem: Problem, before: FitResult, config: DiagnoseConfig) -> bool:
+    """Whether a force that is recorded late beside rigid oil springs would do as well as the springs.
+
+    At one frequency a viscous damper behind a spring lags as a late force does. A friction shows the spring in its
+    flank, where samples resolve it.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum without effects
+    config : how near a rival comes
+    """
+    effect, rigid = library()["sensor_delay"], replace(problem, rigid=True)
+    start = late_instead_of_elastic(problem, before, effect)
+    if start is None or effect.name in config.forbid:
+        return False
+    if least_squares.fit(rigid, (), before.optimum).misfit - before.misfit < config.rival_bic:
+        return False  # the tests do not show the springs
+    late = least_squares.fit(rigid, (effect.name,), start)
+    fewer = before.optimum.size - (late.optimum.size - len(rigid.base))
+    pays = late.misfit - before.misfit - fewer * float(np.log(late.size))
+    natural = not against_nature(late.damper) and late.unknowns[-1].value_in(late.damper) > 0.0
+    return natural and pays < config.rival_bic and trivial(late, effect.name, rigid.scales.low_force) is None
 
 
 def spurious(
