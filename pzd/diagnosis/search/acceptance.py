@@ -22,6 +22,7 @@ from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, late_instead_of_elastic, starts_of, towards_neutral
 from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
 from pzd.record import Array
+from pzd.signals.measures import rms
 
 WITHIN_TEST_SCATTER = "so small that it counts as an offset or a delay of the tests"
 MAY_BE_TEST_SCATTER = "would fit better, and may be no more than an offset or a delay that each test has of its own"
@@ -155,13 +156,19 @@ def spurious(
         return None
     fits = [least_squares.refit(half, candidate.fitted.damper) for half in halves]
     without = least_squares.fit(evidence.halves[0], before.effects, before.optimum)
-    left = least_squares.profiled_misfit(evidence.validation_problem(weighed), without.damper)
+    left = [least_squares.profiled_misfit(half, without.damper) for half in evidence.halves_weighed_by(weighed)]
+    # In the weights of the halves: where the model lacks something else as well, an effect takes a part of it along.
+    explained = sum(without_it - fitted.misfit for without_it, fitted in zip(left, fits, strict=True))
+    negligible = thresholds.HALVES_LOSS * explained
     # Where more than noise is left, all misfits are larger in proportion, and their differences by chance as well.
-    chance = config.rival_bic * max(_spread(fitted) for fitted in fits)
-    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + chance:
+    chance = max(config.rival_bic * max(_spread(fitted) for fitted in fits), negligible)
+    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left[1] + chance:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
-    if not _halves_agree(halves, (fits[0], fits[1]), fresh, thresholds.HALVES_LOSS * -candidate.delta_bic):
+    others = zip(halves, (fits[1].damper, fits[0].damper), strict=True)
+    if not all(_acts(half, other, fresh, config.visible) for half, other in others):
+        return None  # a half in which the effect does not act says nothing of its values
+    if not _halves_agree(halves, (fits[0], fits[1]), fresh, negligible):
         return "stand-in: takes other values on either half of the tests"
     return None
 
@@ -169,6 +176,13 @@ def spurious(
 def _spread(fitted: FitResult) -> float:
     """Return the mean square residual of a fit in units of noise, at least one."""
     return max(1.0, fitted.misfit / max(fitted.size - fitted.optimum.size, 1))
+
+
+def _acts(problem: Problem, damper: Damper, effects: Sequence[str], visible: float) -> bool:
+    """Whether some effects move the force of a damper visibly in any test; `visible` as a share of the test's peak."""
+    without = damper.without_effects(*effects)
+    moved = ((o, shown_force(o, damper) - shown_force(o, without)) for o in problem.observations)
+    return any(rms(o.at_compared(change)) >= visible * o.peak for o, change in moved)
 
 
 def _halves_agree(
