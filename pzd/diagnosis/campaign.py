@@ -130,11 +130,15 @@ class Evidence:
         squares = np.array([residual @ residual for residual in residuals])
         return criterion_error(squares, np.array([o.measured @ o.measured for o in observations]))
 
-    def validation_problem(self, weights: Evidence) -> Problem:
-        """Return the problem of the samples that choose, with these base rows and the weights of other evidence."""
-        mine = self.halves[1]
-        pairs = zip(weights.halves[1].observations, mine.observations, strict=True)
-        return replace(mine, observations=tuple(replace(other, base_row=o.base_row) for other, o in pairs))
+    def halves_weighed_by(self, weights: Evidence) -> tuple[Problem, Problem]:
+        """Return the problems of either half, with these base rows and the weights of other evidence."""
+
+        def weighed(mine: Problem, other: Problem) -> Problem:
+            pairs = zip(other.observations, mine.observations, strict=True)
+            return replace(mine, observations=tuple(replace(o, base_row=own.base_row) for o, own in pairs))
+
+        training, validation = map(weighed, self.halves, weights.halves)
+        return training, validation
 
 
 def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:

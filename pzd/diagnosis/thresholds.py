@@ -96,7 +96,8 @@ HALVES_SIGNIFICANCE = 0.001
 
 Reason: the level of `significance`; the limit on the misfit is twice the quantile of chi-square, for two halves."""
 HALVES_LOSS = 0.05
-"""Share of what an effect explains in all, within which the loss of a half with the other's values counts as agreement.
+"""Share of what an effect explains in all, within which the loss of a half with the other's values counts as agreement,
+and no wider gap there.
 
 Reason: of a parameter that enters linearly a fifth of its value; an effect that explains much tells halves apart by
 what gains and clocks of a stand make of it. Not tuned."""

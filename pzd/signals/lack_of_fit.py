@@ -208,7 +208,9 @@ def fit_smooth_residual(
         by_noise = max(by_noise, white + own)
         # Errors of steps that repeat with the motion lie in few directions, and scatter the more.
         scatter = float(np.var(each, ddof=1)) if each.size > 1 else own**2
-        directions = float(np.clip(2.0 * own**2 / max(scatter, 2.0 * own**2 / rank), 1.0, rank))
+        # Dry friction beside a rigid spring is the same force in all of them but at its jumps: then nothing scatters.
+        fewest = max(scatter, 2.0 * own**2 / rank)
+        directions = float(np.clip(2.0 * own**2 / fewest, 1.0, rank)) if fewest > 0.0 else float(rank)
         beyond = by_noise - white
         shown = by_noise**2 / (white**2 / rank + beyond**2 / directions)
         freedom = by_noise**2 / (white**2 / free + beyond**2 / (directions * each.size))

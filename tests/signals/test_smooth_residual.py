@@ -66,6 +66,16 @@ def test_the_smooth_model_explains_no_more_power_than_the_noise_has(follows: flo
     assert found.noise.variance == pytest.approx(np.var(noise), rel=0.5)
 
 
+def test_errors_of_the_motion_that_change_no_force_change_no_probability(rng: Generator) -> None:
+    """Friction alone beside a rigid oil spring: the judgement once ended in a division by zero."""
+    record, _ = sweep()
+    force, everything = 500.0 * np.sign(record.velocity), np.ones(record.time.size, dtype=np.bool_)
+    residual = SIZE * rng.standard_normal(force.size)
+    known, drawn = (fit_smooth_residual(residual, record, force, everything, d) for d in ((), [(record, force)] * 5))
+    assert drawn.probability == pytest.approx(known.probability)
+    assert drawn.excess == pytest.approx(known.excess)
+
+
 def test_noise_of_the_displacement_is_no_misfit_of_a_viscous_force(rng: Generator) -> None:
     """Velocities that are noisy below 10 Hz are in the force and in the terms: 10^-26 was once said of one."""
     record, _ = sweep()

@@ -167,9 +167,14 @@ def _search(
     """
     low, high = _bounds(problem, unknowns)
     begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
+    elastic = range(2, 3 * len(problem.base), 3)
+    if problem.rigid:
+        begin[elastic] = 0.0
     start_of_rows, prior = problem.start(), _prior(problem, len(unknowns))
     unseen = np.tile(problem.unseen, len(problem.base))
     active = sorted({j for o in problem.observations for j in active_columns(problem, unknowns, o, free)})
+    if problem.rigid:
+        active = [j for j in active if j not in elastic]
 
     def all_variables(x: Array) -> Array:
         at = begin.copy()

@@ -139,6 +139,8 @@ class Problem:
     """Effects whose parameters have one value per voltage of the base rows."""
     budget: Budget = field(default_factory=Budget, repr=False)
     """Counts what is simulated."""
+    rigid: bool = False
+    """Whether every oil spring stays rigid."""
 
     @cached_property
     def voltages(self) -> tuple[float, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,13 +19,18 @@ from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
-from pzd.diagnosis.search.candidates import Candidate, starts_of, towards_neutral
+from pzd.diagnosis.search.candidates import Candidate, late_instead_of_elastic, starts_of, towards_neutral
 from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
 from pzd.record import Array
+from pzd.signals.measures import rms
 
 WITHIN_TEST_SCATTER = "so small that it counts as an offset or a delay of the tests"
 MAY_BE_TEST_SCATTER = "would fit better, and may be no more than an offset or a delay that each test has of its own"
 MAY_BE_CHANCE = "would fit better, though not by so much that chance is out of the question"
+LATE_OR_ELASTIC = (
+    "would fit as well in the place of the oil spring: neither the flank of the yield nor the frequencies of these "
+    "tests tell a force that is recorded late from a soft oil spring; tests at frequencies farther apart would"
+)
 
 
 def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
@@ -108,6 +113,31 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     return MAY_BE_TEST_SCATTER if max(size for size, _ in sizes) >= 1.0 else WITHIN_TEST_SCATTER
 
 
+def late_or_elastic(problem: Problem, before: FitResult, config: DiagnoseConfig) -> bool:
+    """Whether a force that is recorded late beside rigid oil springs would do as well as the springs.
+
+    At one frequency a viscous damper behind a spring lags as a late force does. A friction shows the spring in its
+    flank, where samples resolve it.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum without effects
+    config : how near a rival comes
+    """
+    effect, rigid = library()["sensor_delay"], replace(problem, rigid=True)
+    start = late_instead_of_elastic(problem, before, effect)
+    if start is None or effect.name in config.forbid:
+        return False
+    if least_squares.fit(rigid, (), before.optimum).misfit - before.misfit < config.rival_bic:
+        return False  # the tests do not show the springs
+    late = least_squares.fit(rigid, (effect.name,), start)
+    fewer = before.optimum.size - (late.optimum.size - len(rigid.base))
+    pays = late.misfit - before.misfit - fewer * float(np.log(late.size))
+    natural = not against_nature(late.damper) and late.unknowns[-1].value_in(late.damper) > 0.0
+    return natural and pays < config.rival_bic and trivial(late, effect.name, rigid.scales.low_force) is None
+
+
 def spurious(
     evidence: Evidence, weighed: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate
 ) -> str | None:
@@ -126,13 +156,19 @@ def spurious(
         return None
     fits = [least_squares.refit(half, candidate.fitted.damper) for half in halves]
     without = least_squares.fit(evidence.halves[0], before.effects, before.optimum)
-    left = least_squares.profiled_misfit(evidence.validation_problem(weighed), without.damper)
+    left = [least_squares.profiled_misfit(half, without.damper) for half in evidence.halves_weighed_by(weighed)]
+    # In the weights of the halves: where the model lacks something else as well, an effect takes a part of it along.
+    explained = sum(without_it - fitted.misfit for without_it, fitted in zip(left, fits, strict=True))
+    negligible = thresholds.HALVES_LOSS * explained
     # Where more than noise is left, all misfits are larger in proportion, and their differences by chance as well.
-    chance = config.rival_bic * max(_spread(fitted) for fitted in fits)
-    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left + chance:
+    chance = max(config.rival_bic * max(_spread(fitted) for fitted in fits), negligible)
+    if least_squares.profiled_misfit(halves[1], fits[0].damper) > left[1] + chance:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
-    if not _halves_agree(halves, (fits[0], fits[1]), fresh, thresholds.HALVES_LOSS * -candidate.delta_bic):
+    others = zip(halves, (fits[1].damper, fits[0].damper), strict=True)
+    if not all(_acts(half, other, fresh, config.visible) for half, other in others):
+        return None  # a half in which the effect does not act says nothing of its values
+    if not _halves_agree(halves, (fits[0], fits[1]), fresh, negligible):
         return "stand-in: takes other values on either half of the tests"
     return None
 
@@ -140,6 +176,13 @@ def spurious(
 def _spread(fitted: FitResult) -> float:
     """Return the mean square residual of a fit in units of noise, at least one."""
     return max(1.0, fitted.misfit / max(fitted.size - fitted.optimum.size, 1))
+
+
+def _acts(problem: Problem, damper: Damper, effects: Sequence[str], visible: float) -> bool:
+    """Whether some effects move the force of a damper visibly in any test; `visible` as a share of the test's peak."""
+    without = damper.without_effects(*effects)
+    moved = ((o, shown_force(o, damper) - shown_force(o, without)) for o in problem.observations)
+    return any(rms(o.at_compared(change)) >= visible * o.peak for o, change in moved)
 
 
 def _halves_agree(

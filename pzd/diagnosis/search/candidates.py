@@ -201,7 +201,8 @@ def candidates(
         least = max(drop, thresholds.SHARE_WORTH_FITTING * best)
 
         def one(effect: Effect, gain: float) -> Candidate:
-            return (candidate if gain >= least else _unsearched)(problem, before, effect)
+            worth = gain >= least or late_instead_of_elastic(problem, before, effect) is not None
+            return (candidate if worth else _unsearched)(problem, before, effect)
 
         found = list(pool.map(one, tried, gains))
         worth = thresholds.SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
@@ -229,7 +230,28 @@ def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array 
         fitted = reached[-1].fitted
         if fitted.misfit <= before.misfit + thresholds.STUCK_MISFIT or _switched_off(effect, fitted):
             break
+    rigid = late_instead_of_elastic(problem, before, effect) if start is None else None
+    if rigid is not None:
+        reached.append(_fitted_from(problem, before, effect.name, rigid, thresholds.FIRST_EVALUATIONS))
     return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def late_instead_of_elastic(problem: Problem, before: FitResult, effect: Effect) -> Array | None:
+    """Return a start (3 b + e,) at which a delay of the force takes the place of the oil springs.
+
+    A fit without the delay makes springs of it, and beside them no small delay is better: the way over is barred.
+
+    Returns
+    -------
+    None where the effect is no delay, or the springs do not delay a viscous force by as much as counts
+    """
+    lag = max(row.C_Ns_per_m / row.k_N_per_m for row in before.damper.base)
+    if effect.name != "sensor_delay" or lag < thresholds.TRIVIAL_SIZE[effect.name, "tau"]:
+        return None
+    (tau,) = _new_unknowns(problem, before, effect)
+    rows = _search_start(problem, before).copy()
+    rows[2 : 3 * len(problem.base) : 3] = 0.0
+    return np.append(rows, tau.to_search(lag))
 
 
 def _switched_off(effect: Effect, fitted: FitResult) -> bool:

@@ -17,6 +17,7 @@ from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import FitResult, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.gap import visible_gap
 from pzd.diagnosis.search import acceptance
 from pzd.diagnosis.search.acceptance import ConfounderMatch, Detection, Selection, SelectionStep
 from pzd.diagnosis.search.candidates import (
@@ -119,6 +120,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     weigh = partial(evidence_of, campaign)
     evidence = weigh(damper)
     search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
+    search.settle_weights()
     search.choose_temperature_axis()
     initial_evidence, search.baseline = search.evidence, search.current
     search.adopt_forced()
@@ -148,7 +150,7 @@ class _ForwardSelection:
     weigh: Callable[[Damper], Evidence]
     jobs: int
     identified: Damper
-    """Baseline with the base rows of identify."""
+    """Baseline with the base rows of identify, or of the fit that the weights are from."""
     evidence: Evidence
     """Weighed by what the current damper leaves."""
     current: FitResult
@@ -157,6 +159,20 @@ class _ForwardSelection:
     steps: list[SelectionStep] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
     open_detections: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
+
+    def settle_weights(self) -> None:
+        """Weigh by what the baseline leaves where the identified damper leaves visibly more.
+
+        T0 or C may be empty there, as where a force is late: weights by what is left without it believe no test.
+        """
+        for _ in range(thresholds.MOST_REWEIGHTINGS):
+            weighed_by = visible_gap(self.evidence.campaign.checks(self.identified))
+            left = max(self.evidence.gap(self.current), self.config.negligible)
+            if weighed_by <= thresholds.LARGEST_GAP_GROWTH * left:
+                break
+            self.identified = self.current.damper
+            self.evidence = self.weigh(self.identified)
+            self.current = fit(self.evidence.whole, (), self.evidence.whole.start())
 
     def adopt_forced(self) -> None:
         """Adopt what the config asks for."""
@@ -351,16 +367,19 @@ class _ForwardSelection:
 
     def undecided(self) -> tuple[str, ...]:
         """Return the effects that fit better where nothing was adopted but are rivals of none, each with its reason."""
-        if self.current.effects or not self.steps:
+        if self.current.effects:
             return ()
-        short = [c for c in self.steps[-1].tried if c.delta_bic > self.config.adopt_bic]
+        short = [c for c in (self.steps[-1].tried if self.steps else ()) if c.delta_bic > self.config.adopt_bic]
         best = min((c.delta_bic for c in short), default=0.0)
         if best <= -self.config.rival_bic:
             lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
                     self.reasons[each.effect] = self._refused(lenient, each) or acceptance.MAY_BE_CHANCE
-        undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE
+        explained = not self.evidence.gap_is_significant(self.current, self.config)
+        if explained and acceptance.late_or_elastic(self.evidence.whole, self.current, self.config):
+            self.reasons["sensor_delay"] = acceptance.LATE_OR_ELASTIC
+        undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE, acceptance.LATE_OR_ELASTIC
         return tuple(name for name, why in self.reasons.items() if why in undecided)
 
     def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
