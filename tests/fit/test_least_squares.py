@@ -127,7 +127,7 @@ def bent(rng: np.random.Generator) -> tuple[list[Array], Callable[[Array], Array
 
     def residuals(x: Array) -> Array:
         seen.append(x.copy())
-        return x[0] * np.exp(-x[1] * time) - values
+        return np.asarray(x[0] * np.exp(-x[1] * time) - values)
 
     return seen, residuals, lambda x: np.column_stack([np.exp(-x[1] * time), -time * x[0] * np.exp(-x[1] * time)])
 
