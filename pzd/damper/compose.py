@@ -22,6 +22,8 @@ from pzd.record import Array
 
 BRANCHES = len(acting("branch"))
 """Number of branches, each with a deflection of its own."""
+MEMORYLESS = sum(len(effect.parameters) for effect in acting("parallel"))
+"""Number of columns of a row of the parallel forces that belong to those without memory."""
 TOLERANCE = 1e-9
 """Admissible error of one piece of the path, as a share of the force."""
 
@@ -129,6 +131,26 @@ def parallel_force_along(motion: Motion, parallel: Array) -> Array:
     """
     force = kernels.parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
     return force + branch_forces(motion, parallel) if any_slips(parallel) else force
+
+
+def parallel_force_change(motions: tuple[Motion, Motion], rows: tuple[Array, Array]) -> Array:
+    """Compute by how much the parallel forces differ (n,) between two sets of parameters [N].
+
+    Branches follow the travel of the rod, whatever its zero: where their parameters are the same they are left out.
+
+    Parameters
+    ----------
+    motions : (n,) sampled motion, counted from the zero of either set
+    rows : (n, m) or (1, m) rows of these forces
+    """
+    one, other = (
+        kernels.parallel_forces(motion.displacement, motion.velocity, motion.acceleration, each)
+        for motion, each in zip(motions, rows, strict=True)
+    )
+    change = other - one
+    if not np.array_equal(rows[0][:, MEMORYLESS:], rows[1][:, MEMORYLESS:]):
+        change += branch_forces(motions[1], rows[1]) - branch_forces(motions[0], rows[0])
+    return change
 
 
 def branch_forces(motion: Motion, rows: Array) -> Array:

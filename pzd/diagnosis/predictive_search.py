@@ -125,7 +125,7 @@ class PredictiveSearch:
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""
-        found = per_voltage_candidates(problem, fitted)
+        found = per_voltage_candidates(problem, fitted, self.validation.campaign.jobs)
         found += self._further(problem, fitted, thresholds.SCREENED_EFFECTS)
         return self._possible(problem, found)
 
@@ -142,12 +142,12 @@ class PredictiveSearch:
             for effect in library().values()
             if effect.name not in barred and not effect.needs_displacement_zero and testable(problem, effect)
         ]
-        found = []
-        for promise in most_promising(problem, fitted, new, self.reached)[:count]:
-            tried = candidate(promise.problem, fitted, promise.effect, promise.start)
-            self.reached[promise.effect.name] = tried.fitted.optimum[fitted.optimum.size :]
-            found.append(replace(tried, varies=promise.problem is not problem))
-        return found
+        campaign = self.validation.campaign
+        promises = most_promising(problem, fitted, new, self.reached, campaign.jobs)[:count]
+        tried = campaign.parallel_map(lambda each: candidate(each.problem, fitted, each.effect, each.start), promises)
+        self.reached.update((each.effect, each.fitted.optimum[fitted.optimum.size :]) for each in tried)
+        pairs = zip(tried, promises, strict=True)
+        return [replace(each, varies=promise.problem is not problem) for each, promise in pairs]
 
     def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Proposal]:
         """Return the candidates that move the force visibly, with values that nature has and the tests determine.
@@ -155,14 +155,16 @@ class PredictiveSearch:
         Whether one may be off is for the prediction to say: where two of its parameters go together, as the length of a
         pocket and its pressure do, the interval of either holds zero though both together are there.
         """
-        proposals = []
-        for each in found:
+
+        def proposal(each: Candidate) -> _Proposal | None:
             if each.explained < self.config.visible or against_nature(each.fitted.damper):
-                continue
+                return None
             own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
-            if undetermined(own, each.fitted).get(each.effect, MAY_BE_OFF) == MAY_BE_OFF:
-                proposals.append(_Proposal.of(own, each.fitted, self.validation))
-        return proposals
+            none = undetermined(own, each.fitted).get(each.effect, MAY_BE_OFF) != MAY_BE_OFF
+            return None if none else _Proposal.of(own, each.fitted, self.validation)
+
+        made = self.validation.campaign.parallel_map(proposal, found)
+        return [each for each in made if each is not None]
 
     def _searched_on(self, proposal: _Proposal) -> _Proposal:
         """Return a proposal at its optimum: candidates are fitted in a few evaluations."""

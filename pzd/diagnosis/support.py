@@ -40,13 +40,18 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
     if whole is None or plain is None:
         return {}
     own, before = validation.error_to_first_order(*whole), validation.error_to_first_order(*plain)
-    found = {}
-    for name in damper.effects:
-        fewer = validation.fit_by_criterion(whole[1].damper.without_effects(name), validation.no_samples)
-        if fewer is not None:
-            without = validation.error_to_first_order(*fewer)
-            found[name] = _support(own, without, before, validation, adoption.alternatives.get(name))
-    return found
+    fitted = whole[1].damper
+
+    def without(name: str) -> PredictionError | None:
+        fewer = validation.fit_by_criterion(fitted.without_effects(name), validation.no_samples)
+        return None if fewer is None else validation.error_to_first_order(*fewer)
+
+    errors = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
+    return {
+        name: _support(own, error, before, validation, adoption.alternatives.get(name))
+        for name, error in errors
+        if error is not None
+    }
 
 
 def _support(

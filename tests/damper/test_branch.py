@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.compose import branch_forces, respond, static_force, steady_force
+from pzd.damper.compose import (
+    branch_forces,
+    parallel_force_along,
+    parallel_force_change,
+    respond,
+    static_force,
+    steady_force,
+)
 from pzd.damper.confounders import module_of
 from pzd.damper.effect import arguments
 from pzd.damper.effects import library, nameable
@@ -182,3 +189,19 @@ def test_two_travels_to_one_side_are_their_sum_and_a_step_may_be_cut_anywhere(rn
 def test_no_verdict_names_a_branch() -> None:
     assert "second_branch" in library()
     assert "second_branch" not in nameable()
+
+
+@pytest.mark.parametrize("moved", ["gas_spring", "second_branch", "zero"])
+def test_the_change_of_the_parallel_forces_is_the_difference_of_two(moved: str) -> None:
+    """Whether branches move, or only what has no memory, or the zero from which the displacement counts."""
+    effects = {"gas_spring": {"k_g": 3000.0}, "second_branch": {"T0_2": SLIPS, "k_2": STIFFNESS}}
+    changed = {**effects, **({} if moved == "zero" else {moved: {n: 1.1 * v for n, v in effects[moved].items()}})}
+    rows = tuple(constant_rows(300.0, 2700.0, 2e6, each)[1] for each in (effects, changed))
+    motion = sine(0.01, samples=200)
+    motions = motion, motion.centred_on(0.002 if moved == "zero" else 0.0)
+    assert rows[0] is not None
+    assert rows[1] is not None
+    one, other = (parallel_force_along(m, r) for m, r in zip(motions, (rows[0], rows[1]), strict=True))
+    change = parallel_force_change(motions, (rows[0], rows[1]))
+    assert np.max(np.abs(other - one)) > 1.0
+    assert change == pytest.approx(other - one, abs=1e-9)

@@ -13,7 +13,7 @@ from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cross_validation_of, predicts_worse
-from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.least_squares import StepWithout, fit, search_errors
 from pzd.diagnosis.verdict import no_prediction_note
 from pzd.record import Record
 
@@ -209,3 +209,50 @@ def test_to_first_order_each_test_is_predicted_as_by_a_refit_without_its_fold(rn
     assert (quick.criterion or 0.0) > 1.1 * seen.sum() / energy.sum()
     order = [slow.records.index(i) for i in quick.records]
     assert quick.error / quick.energy == pytest.approx((slow.error / slow.energy)[order], rel=0.05)
+
+
+def test_the_step_without_some_tests_goes_to_their_optimum(rng: np.random.Generator) -> None:
+    """Springs and offsets are linear: one step is all, whichever tests are left out; with all of them it stands."""
+    truth = damper_of((0.0,), gas_spring={"k_g": 4000.0}, preload_offset={"F_0": 60.0})
+    records = sines(truth, rng, (0.0,), tests=[*TESTS, (1.0, 0.02), (1.0, 0.03)], cycles=3, jitter=0.03, noise=1e-3)
+    asked = validation(records, damper_of((0.0,)))
+    found = asked.fit_by_criterion(truth, asked.no_samples)
+    assert found is not None
+    problem = found[0].started_at(found[1].damper)
+    whole = fit(problem, found[1].effects, found[1].optimum, enough=1e-4)
+    without, names = StepWithout.at(problem, whole.damper), [o.name for o in problem.observations]
+    errors = search_errors(whole, slice(0, whole.optimum.size))
+    assert np.all(np.abs(without.step(())) < 0.2 * errors)
+    for gone in ({names[0]}, {names[1], names[4]}):
+        kept = replace(problem, observations=tuple(o for o in problem.observations if o.name not in gone))
+        there = whole.optimum + without.step(gone)
+        exact = fit(kept, whole.effects, there, enough=1e-4).optimum
+        moved = np.linalg.norm((exact - whole.optimum) / errors)
+        assert np.linalg.norm((there - exact) / errors) < 0.2 * moved
+
+
+def test_to_first_order_it_does_not_matter_how_far_a_fit_was_searched(rng: np.random.Generator) -> None:
+    """Three standard errors beside the optimum, where the slopes of the tests do not cancel, the error is the same."""
+    truth = damper_of((0.0,), gas_spring={"k_g": 4000.0}, preload_offset={"F_0": 60.0})
+    records = sines(truth, rng, (0.0,), tests=TESTS, cycles=3, jitter=0.03, noise=1e-3)
+    asked = validation(records, damper_of((0.0,)))
+    found = asked.fit_by_criterion(truth, asked.no_samples)
+    assert found is not None
+    problem, whole = found
+    beside = whole.optimum + 3.0 * search_errors(whole, slice(0, whole.optimum.size))
+    rough = fit(problem, whole.effects, beside, evaluations=1)
+    assert rough.misfit > 1.5 * whole.misfit
+    here, there = (asked.error_to_first_order(problem, each).criterion for each in (whole, rough))
+    assert there == pytest.approx(here, rel=0.1)
+
+
+def test_the_same_is_not_computed_twice(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, preload_offset={"F_0": 120.0})
+    asked = validation(sines(truth, rng, TWO, cycles=2), damper_of(TWO))
+    first = asked.error_by_criterion(truth)
+    spent = asked.campaign.budget.spent
+    assert asked.error_by_criterion(truth.model_copy()) is first
+    assert asked.fit_by_criterion(truth, asked.no_samples) is asked.fit_by_criterion(truth, asked.no_samples)
+    assert asked.campaign.budget.spent == spent
+    asked.error_by_criterion(damper_of(TWO, preload_offset={"F_0": 121.0}))
+    assert asked.campaign.budget.spent > spent

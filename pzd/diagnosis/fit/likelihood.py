@@ -238,10 +238,10 @@ class WeightedRecord:
             return self.standardised(
                 np.column_stack([self.measured - self.at_compared(force), -self.at_compared(slopes)])
             )
-        delay = self.likeliest_delay(self.delayed(force))
-        at = self.delayed(np.column_stack([force, slopes]))
-        shifted = at(delay)
-        late = (at(delay + DELAY_STEP)[:, 0] - shifted[:, 0]) * (self.delay_s / DELAY_STEP)
+        delayed = self.delayed(force)
+        delay = self.likeliest_delay(delayed)
+        shifted = self.delayed(np.column_stack([force, slopes]))(delay)
+        late = (delayed(delay + DELAY_STEP) - shifted[:, 0]) * (self.delay_s / DELAY_STEP)
         values = np.column_stack([self.measured - shifted[:, 0] + late * (delay / self.delay_s), -shifted[:, 1:], late])
         scaled = self.standardised(values)
         found, own = scaled[:, :-1], scaled[:, -1]
@@ -270,6 +270,12 @@ class WeightedRecord:
         return has_predecessors(
             self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0
         )
+
+    @property
+    def residual_count(self) -> int:
+        """Number of residuals w."""
+        averaged = not isinstance(self.noise, Autoregression)
+        return 2 * self.weights.size - 1 if averaged else int(np.count_nonzero(self._unbroken))
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):

@@ -217,18 +217,40 @@ class Problem:
 
     def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
         """Return the parameters at a point of the search."""
-        split = 3 * len(self.base)
-        base = searched[:split].reshape(-1, 3)
+        base = searched[: 3 * len(self.base)].reshape(-1, 3)
         values = np.array([self.coordinates.from_search(np.maximum(row, 0.0)) for row in base])
+        return Point(values, *self._effects(searched, unknowns), self)
+
+    def point_beside(self, point: Point, searched: Array, unknowns: Sequence[Unknown], moved: int) -> Point:
+        """Return the parameters at a point of the search that differs from another one in one variable alone.
+
+        Parameters
+        ----------
+        point : the other one
+        searched : (3 b + e,) the point
+        unknowns : of the effects
+        moved : the variable
+        """
+        row = moved // 3
+        if row >= len(self.base):
+            return Point(point.base, *self._effects(searched, unknowns), self)
+        values = point.base.copy()
+        values[row] = self.coordinates.from_search(np.maximum(searched[3 * row : 3 * row + 3], 0.0))
+        return Point(values, point.effects, point.displacement_zero, self)
+
+    def _effects(
+        self, searched: Array, unknowns: Sequence[Unknown]
+    ) -> tuple[Mapping[str, Mapping[str, float | tuple[float, ...]]], float]:
+        """Return the values by effect and parameter, and the zero of the displacement [m], at a point of the search."""
         effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
         zero = 0.0
-        for unknown, x in zip(unknowns, searched[split:], strict=True):
+        for unknown, x in zip(unknowns, searched[3 * len(self.base) :], strict=True):
             if unknown.parameter is ZERO:
                 zero = unknown.value(float(x))
                 continue
             given, name, value = effects.setdefault(unknown.effect, {}), unknown.parameter.name, unknown.value(float(x))
             given[name] = value if unknown.node is None else (*cast("tuple[float, ...]", given.get(name, ())), value)
-        return Point(values, effects, self, zero)
+        return effects, zero
 
 
 def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
@@ -250,9 +272,9 @@ class Point:
     """(b, 3) T0 [N], C [N s/m], k [N/m]."""
     effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
     """Values by effect and parameter; tuples are per voltage."""
-    problem: Problem
-    displacement_zero: float = 0.0
+    displacement_zero: float
     """Zero of the displacement [m]."""
+    problem: Problem
     _nodes_by_temperature: dict[float | None, DamperNodes] = field(default_factory=dict, repr=False)
 
     @cached_property

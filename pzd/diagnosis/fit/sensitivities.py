@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from pzd.damper import parameter_rows
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
+from pzd.damper.compose import (
+    constant_value,
+    integrated_sensitivities,
+    parallel_force_along,
+    parallel_force_change,
+    sensors_of,
+)
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
 from pzd.damper.path import Variables
@@ -49,18 +55,23 @@ class KernelInputs:
             return at_nodes
         return parameter_rows.rows_along(self.nodes, at_nodes, self.effective_voltage)
 
-    def difference_to(self, other: KernelInputs) -> Array:
-        """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite; for k, of 1/k.
+    def difference_to(self, other: KernelInputs) -> tuple[NDArray[np.int64], Array]:
+        """Return the (c,) columns in which another damper differs, and (1, c), (k, c) or (m, c) its rows less these.
 
-        Linear between nodes is k, so that along a voltage the difference of 1/k is formed where it is needed.
+        A difference of two infinite values is 0. For k it is that of 1/k: linear between nodes is k, so that along a
+        voltage it is formed where it is needed.
         """
-        same_voltage = self.effective_voltage is other.effective_voltage and np.array_equal(
-            self.at_nodes[:, K], other.at_nodes[:, K]
-        )
-        mine, others = (self.at_nodes, other.at_nodes) if same_voltage else (self.rows, other.rows)
-        mine, others = _with_compliance(mine), _with_compliance(others)
+        same_voltage = self.effective_voltage is other.effective_voltage
+        differs = np.any(self.at_nodes != other.at_nodes, axis=0)
+        if not same_voltage:
+            differs |= np.any(self.at_nodes != self.at_nodes[:1], axis=0)
+        columns = np.flatnonzero(differs)
+        mine, others = self.at_nodes[:, columns], other.at_nodes[:, columns]
+        if not same_voltage or differs[K]:
+            mine, others = self._interpolated(mine), other._interpolated(others)
+        mine, others = (np.divide(1.0, rows, out=rows.copy(), where=columns == K) for rows in (mine, others))
         shape = np.broadcast_shapes(mine.shape, others.shape)
-        return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
+        return columns, np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
     def along_motion(self, change: Array) -> Array:
         """Interpolate values given at the nodes to (1, c) or (m, c) along the motion."""
@@ -73,16 +84,26 @@ class KernelInputs:
         return parallel_force_along(o.motion.centred_on(self.displacement_zero), self.parallel)
 
 
-def _with_compliance(rows: Array) -> Array:
-    """Return (n, r) rows with 1/k in the place of k."""
-    moved = rows.copy()
-    moved[:, K] = 1.0 / rows[:, K]
-    return moved
+def kernel_inputs(point: Point, o: WeightedRecord, beside: tuple[Point, KernelInputs] | None = None) -> KernelInputs:
+    """Evaluate the parameters of a point along the motion of an observation.
+
+    Parameters
+    ----------
+    point : the point
+    o : the observation
+    beside : another point with its parameters; those of its effects are not evaluated again where they are the same
+    """
+    if o.base_row < 0:
+        return _at_moving_voltage(point, o)
+    if beside is not None and point.effects is beside[0].effects and not _has_material(point):
+        found = replace(beside[1], at_nodes=beside[1].at_nodes.copy())
+        found.at_nodes[:, : len(ELEMENT)] = point.base[o.base_row]
+        return found
+    return _at_constant_voltage(point, o)
 
 
-def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
-    """Evaluate the parameters of a point along the motion of an observation."""
-    return _at_constant_voltage(point, o) if o.base_row >= 0 else _at_moving_voltage(point, o)
+def _has_material(point: Point) -> bool:
+    return any(known()[name].place == "material" for name in point.effects)
 
 
 def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
@@ -137,10 +158,18 @@ def search_directions(
     o : the observation
     """
     here = kernel_inputs(point, o)
-    pairs = [(kernel_inputs(a, o), kernel_inputs(b, o), width) for a, b, width in neighbours]
-    changes = [before.difference_to(after) / width for before, after, width in pairs]
-    moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
-    along = [here.along_motion(change[:, moved]) for change in changes]
+    known_inputs = point, here
+    pairs = [
+        (kernel_inputs(a, o, known_inputs), kernel_inputs(b, o, known_inputs), width) for a, b, width in neighbours
+    ]
+    changes = [(*before.difference_to(after), width) for before, after, width in pairs]
+    moved = np.unique(np.concatenate([columns[np.any(change != 0.0, axis=0)] for columns, change, _ in changes]))
+    along = []
+    for columns, change, width in changes:
+        by = np.zeros((len(change), moved.size))
+        kept = np.isin(columns, moved)
+        by[:, np.searchsorted(moved, columns[kept])] = change[:, kept] / width
+        along.append(here.along_motion(by))
     return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
 
 
@@ -187,13 +216,12 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
 def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
     """Compute the (m,) or (1,) derivative of the parallel force along a direction [N]."""
     before, after, width = pair
-    if before.displacement_zero == after.displacement_zero and _equal_rows(before.parallel, after.parallel):
+    zeros, rows = (before.displacement_zero, after.displacement_zero), (before.parallel, after.parallel)
+    same = rows[0] is rows[1] or (rows[0] is not None and rows[1] is not None and np.array_equal(rows[0], rows[1]))
+    if rows[0] is None or rows[1] is None or (zeros[0] == zeros[1] and same):
         return np.zeros(1)
-    return (after.parallel_force(o) - before.parallel_force(o)) / width
-
-
-def _equal_rows(one: Array | None, other: Array | None) -> bool:
-    return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
+    motions = o.motion.centred_on(zeros[0]), o.motion.centred_on(zeros[1])
+    return parallel_force_change(motions, (rows[0], rows[1])) / width
 
 
 # --- Residuals and their Jacobian
@@ -288,12 +316,12 @@ def _sensitivities_at(
     below, above = np.maximum(x[:free] - STEP, low), np.minimum(x[:free] + STEP, high)
 
     def moved(j: int, value: float) -> Point:
-        return problem.point(np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns)
+        return problem.point_beside(point, np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns, j)
 
     columns_wanted = range(free) if wanted is None else wanted
     neighbours = {j: (moved(j, below[j]), moved(j, above[j]), float(above[j] - below[j])) for j in columns_wanted}
     # Observations of one base row share their directions, unless a material effect goes by the temperature of each.
-    shared = all(known()[name].place != "material" for name in point.effects)
+    shared = not _has_material(point)
     cached = dict[int, SearchDirections]()
     for o in problem.observations:
         columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)

@@ -48,7 +48,11 @@ class Promise:
 
 
 def most_promising(
-    problem: Problem, before: FitResult, effects: Sequence[Effect], reached: Mapping[str, Array] | None = None
+    problem: Problem,
+    before: FitResult,
+    effects: Sequence[Effect],
+    reached: Mapping[str, Array] | None = None,
+    jobs: int = 1,
 ) -> list[Promise]:
     """Return what one linearised step promises of some effects, the smallest misfits first.
 
@@ -58,16 +62,20 @@ def most_promising(
     before : optimum with the effects adopted so far
     effects : to be tried
     reached : values that an earlier search of an effect reached, by its name: they take the place of its starts
+    jobs : effects that are linearised at the same time
     """
-    promises = []
-    for effect in effects:
+    _ = before.column_basis  # needed by every effect: computed once, before they go to threads of their own
+
+    def promise(effect: Effect) -> Promise:
         own, values = problem.with_friction_scaling(effect), (reached or {}).get(effect.name)
         starts = starts_of(own, before, effect)
         starts = starts if values is None or values.size != starts[0].size else [values]
         found = [(_promised_misfit(own, before, effect, start), start) for start in starts]
         misfit, start = min(found, key=lambda each: each[0])
-        promises.append(Promise(effect, own, start, misfit))
-    return sorted(promises, key=lambda each: each.misfit)
+        return Promise(effect, own, start, misfit)
+
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        return sorted(pool.map(promise, effects), key=lambda each: each.misfit)
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
@@ -274,13 +282,14 @@ def best_confounder(problem: Problem, before: FitResult) -> Candidate:
     return min(tried, key=lambda c: c.delta_bic)
 
 
-def per_voltage_candidates(problem: Problem, before: FitResult) -> list[Candidate]:
-    """Fit every effect of `before` whose parameters may differ by voltage with one value per voltage."""
+def per_voltage_candidates(problem: Problem, before: FitResult, jobs: int = 1) -> list[Candidate]:
+    """Fit every effect of `before` that may differ by voltage with one value per voltage, `jobs` at the same time."""
     if len(problem.voltages) == 1:
         return []
     shared = [library()[name] for name in before.effects if name not in problem.per_voltage]
     free = [e.name for e in shared if e.place in PLACES_PER_VOLTAGE and not e.same_at_every_voltage]
-    return [_fitted_per_voltage(problem, before, name) for name in free]
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        return list(pool.map(lambda name: _fitted_per_voltage(problem, before, name), free))
 
 
 def _fitted_per_voltage(

@@ -207,7 +207,8 @@ class _ForwardSelection:
         tried = self._candidates(self.evidence, self.current)
         if self._descends_from(tried):
             tried = self._candidates(self.evidence, self.current)
-        steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
+        varied = per_voltage_candidates(self.evidence.whole, self.current, self.jobs)
+        steps = sorted((*tried, *varied), key=lambda c: c.delta_bic)
         first = self._best_supported(steps)
         if first is None:
             return self._pair(tried)
