@@ -277,10 +277,10 @@ class Findings:
             verdict = "ambiguous"
         told = list(dict.fromkeys(name for names in others.values() for name in names))
         if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
-            # Beside what has no name a change that has rivals is not supported by itself.
             verdict = "unexplained"
-            told = list(dict.fromkeys([*(c.name for c in reported if c.name in rivals), *told]))
-            reported = [change for change in reported if change.name not in rivals]
+            doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
+            told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
+            reported = [change for change in reported if change.name not in doubtful]
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
@@ -334,6 +334,10 @@ class Findings:
         if perhaps := self.search.perhaps(best):
             rivals[NOTHING] = perhaps
         return best, rivals
+
+    def _stands_out(self, best: Fitted, candidate: Candidate) -> bool:
+        """Whether a change makes more than what is left without a name, which may be of the same cause."""
+        return self.search.size_of(best, candidate) > self.search.left(best)
 
     def _next_test(self, best: Fitted, rivals: dict[str, list[Fitted]]) -> NextTest | None:
         """Return the test that tells the first change with rivals from these, in place or on the damper."""

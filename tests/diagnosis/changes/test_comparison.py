@@ -201,3 +201,20 @@ def test_a_fluid_that_thins_beside_a_yield_that_rounds_is_named(rng: np.random.G
     before = campaign(damper, rng)
     changes = found(before, campaign(damper.with_effect("shear_thinning", {"n": 0.8}), rng))
     assert "shear_thinning" in names_told(changes)
+
+
+def test_hum_that_stands_in_every_cycle_hides_no_change(rng: np.random.Generator) -> None:
+    """60 Hz is the twentieth harmonic of 3 Hz: no scatter between cycles tells of it, and it differs from run to run."""
+
+    def humming(records: tuple[Record, ...]) -> list[Record]:
+        phases = rng.uniform(0.0, 2.0 * np.pi, len(records))
+        return [
+            replace(r, force=r.force + 10.0 * np.sin(120.0 * np.pi * r.time + phase))
+            for r, phase in zip(records, phases, strict=True)
+        ]
+
+    damper, motions = drawn_damper(rng), ((3.0, 0.01), (3.0, 0.02))
+    before, after = (campaign(d, rng, motions) for d in (damper, scaled(damper, T0_N=1.03)))
+    changes = found(humming(before), humming(after))
+    assert names(changes) == names(found(before, after)) == ["T0"]
+    assert changes.difference.left_N == pytest.approx(found(before, after).difference.left_N, rel=0.2)
