@@ -6,8 +6,8 @@ Each pair is a damper drawn from the whole space of `pzd/blind/independent`, wit
 both states, on sines (and triangles) at one or more values of the control signal. `changed`: one or two quantities of
 the damper change by 0.5 to 5 % of peak each, `same`: nothing, `stand`: the load cell's zero or gain, or a delay. In a
 third of the changed pairs the second state runs other motions. With `--diagnose` the first state is diagnosed, as the
-command does. A line a pair, then how many are right, ambiguous with the truth among the rivals, silent, or wrong, and
-how many intervals hold the true change.
+command does. A line a pair, then how many are right, ambiguous with the truth among the rivals, incomplete (names of
+the truth, not all of it), silent, or wrong, and how many intervals hold the true change.
 """
 
 from __future__ import annotations
@@ -151,13 +151,15 @@ def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
     named = {c.name for c in found.changes if c.of == "damper"}
     of_damper = {name for name in truth if name not in STAND}
     told = {c.name for c in found.changes} | set(found.rivals)
-    if found.verdict == "ambiguous":
-        return "ambiguous" if set(truth) <= told else "wrong"
+    if found.verdict == "ambiguous" and set(truth) <= told:
+        return "ambiguous"
     if named - of_damper:
-        return "wrong" if found.verdict == "changed" else "wrong, unexplained"
-    if named == of_damper and found.verdict != "unexplained":
+        return "wrong, unexplained" if found.verdict == "unexplained" else "wrong"
+    if found.verdict == "unexplained":
+        return "unexplained"
+    if named == of_damper and found.verdict != "ambiguous":
         return "right"
-    return "unexplained" if found.verdict == "unexplained" else "silent"
+    return "incomplete" if found.verdict != "unchanged" else "silent"
 
 
 def held(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> Iterator[bool]:

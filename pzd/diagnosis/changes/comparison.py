@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
 
 from pzd.artefacts import NextTest, Rig
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
-from pzd.damper.model import BaseRow
+from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
     ELEMENT_COLUMNS,
@@ -24,14 +24,18 @@ from pzd.diagnosis.changes.candidates import (
     parameter_value,
 )
 from pzd.diagnosis.changes.pairs import (
+    MOST_HARMONICS,
     AveragedTest,
     Comparison,
     averaged,
     course,
     cycles_compared,
     model_compared,
+    nearest_motion,
+    octave_mean,
     paired,
     stacked,
+    stacked_variance,
     unstacked,
 )
 from pzd.diagnosis.changes.regression import LEVEL, Fitted, Likelihood, Regression
@@ -45,6 +49,7 @@ from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array
 from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
+from pzd.signals.nuisance import NuisanceConfig
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
 
@@ -63,6 +68,10 @@ STAND_TESTS = {
     "recorder_delay": "sine, a steel spring in the place of the damper",
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
+BEYOND_TESTED = 2.0
+"""Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
+
+Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
@@ -119,10 +128,11 @@ def findings_between(
     before: State, after: State, diagnose: DiagnoseConfig, identify: IdentifyConfig, control: Control
 ) -> Findings:
     """Compare two states and search for what changed; see `changes_between`."""
-    comparisons = comparisons_of(before, after, identify)
+    known = _own_missed(before, diagnose.nuisance)
+    comparisons = comparisons_of(before, after, identify, diagnose.nuisance, known)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
     first = FirstState(about(before.damper, mean), max(c.peak for c in comparisons), before.scales())
-    likelihood = Likelihood(comparisons, diagnose.nuisance, model_discrepancy(before))
+    likelihood = Likelihood(comparisons, diagnose.nuisance, known.share)
     regression = Regression(likelihood, Response(first, comparisons))
     search = Search(
         regression, candidates(first, comparisons), diagnose.adopt_bic, diagnose.rival_bic, diagnose.visible
@@ -164,8 +174,20 @@ def changes_between_rigs(
 # --- What is compared
 
 
-def comparisons_of(before: State, after: State, identify: IdentifyConfig) -> tuple[Comparison, ...]:
+def comparisons_of(
+    before: State, after: State, identify: IdentifyConfig, nuisance: NuisanceConfig, own: Missed
+) -> tuple[Comparison, ...]:
     """Pair the tests, and compare the others of the second state with the damper of the first.
+
+    What that damper misses of the nearest motion of the first state is taken to be missed here too, where that
+    predicts the tests of the first state from one another better than the damper alone predicts its own.
+
+    Parameters
+    ----------
+    before, after : the states
+    identify : for what counts as one condition
+    nuisance : priors on how tests differ by themselves
+    own : what the damper misses in its own tests
 
     Raises
     ------
@@ -185,10 +207,19 @@ def comparisons_of(before: State, after: State, identify: IdentifyConfig) -> tup
     found = [cycles_compared(before.damper, one[i], other[j]) for i, j in pairs]
     mean = float(np.mean([t.displacement[0].real for t in one])) if one else before.damper.zero_m
     rest = [test for j, test in enumerate(other) if j not in matched]
-    known = [test for test in rest if _as_tested(before, test, identify)]
-    if not known and not found:
-        known = [test for test in rest if _in_range(before, test)]
-    found += [model_compared(before.damper, test, mean, _temperature(before, test)) for test in known]
+    beside = [test for test in rest if _as_tested(before, test, identify)]
+    if not beside and not found:
+        beside = [test for test in rest if _in_range(before, test)]
+    carried = _carried(before.damper, one, within, nuisance) if beside else Missed.unknown()
+    if BEYOND_TESTED * own.share <= carried.share:
+        carried = Missed.unknown()
+    for test in beside:
+        partner = nearest_motion(test, one, within)
+        if partner is not None and carried.share < np.inf:
+            found.append(carried.beside(replace(cycles_compared(before.damper, partner, test), before=None)))
+        else:
+            through = model_compared(before.damper, test, mean, _temperature(before, test))
+            found.append(own.beside(through, BEYOND_TESTED))
     if not found:
         raise DataError(f"{before.name}, {after.name}: no test of either state has a control signal of the other")
     return tuple(found)
@@ -230,15 +261,60 @@ def _temperature(before: State, test: AveragedTest) -> float | None:
     return float(np.clip(test.temperature, min(recorded), max(recorded)))
 
 
-def model_discrepancy(state: State) -> float:
-    """Return what the damper misses in its own tests, as a share of the force (r.m.s.)."""
-    missed, force = 0.0, 0.0
-    for test in averaged(state.prepared):
-        mean = float(test.displacement[0].real)
-        alone = model_compared(state.damper, test, mean, test.temperature)
-        missed += max(float(np.sum(alone.difference**2 - alone.variance)), 0.0) / alone.peak**2
-        force += float(np.sum(np.abs(stacked(alone.reference)) ** 2)) / alone.peak**2
-    return float(np.sqrt(missed / force)) if force > 0.0 else 0.0
+@dataclass(frozen=True, eq=False)
+class Missed:
+    """What a model misses of tests of the first state, offset, gain and delay that each has of its own left out."""
+
+    share: float
+    """Of the force (r.m.s.)."""
+    power: Array
+    """(H + 1,) mean square at every harmonic, as a share of the squared peak force, over the octave about it."""
+
+    @classmethod
+    def unknown(cls) -> Missed:
+        """Return what is missed where there are no tests that tell."""
+        return cls(np.inf, np.zeros(1))
+
+    @classmethod
+    def of(cls, comparisons: Sequence[Comparison], nuisance: NuisanceConfig) -> Missed:
+        """Return what is left of differences beyond noise and what tests differ by themselves."""
+        likelihood = Likelihood(tuple(comparisons), nuisance, 0.0)
+        residuals = [c.difference for c in comparisons]
+        scatter, _ = likelihood.best_scatter(residuals)
+        missed, force, powers = 0.0, 0.0, np.full((len(comparisons), MOST_HARMONICS + 1), np.nan)
+        for c, r, own, power in zip(
+            comparisons, residuals, likelihood.own_of_tests(residuals, scatter), powers, strict=True
+        ):
+            missed += max(float((r - own) @ (r - own) - np.sum(c.variance)), 0.0) / c.peak**2
+            force += float(np.sum(stacked(c.reference) ** 2)) / c.peak**2
+            power[: c.rate.size] = np.abs(unstacked(r - own)) ** 2 / c.peak**2
+        known = np.nan_to_num(np.nanmean(powers[:, : max(c.rate.size for c in comparisons)], axis=0))
+        octaves = octave_mean(known)
+        octaves[0] = known[0]
+        return cls(float(np.sqrt(missed / force)) if force > 0.0 else 0.0, octaves)
+
+    def beside(self, comparison: Comparison, times: float = 1.0) -> Comparison:
+        """Return a comparison in which a model stands for a test, and misses so many times what it misses here."""
+        power = np.zeros(comparison.rate.size)
+        size = min(power.size, self.power.size)
+        power[:size] = self.power[:size] * (times * comparison.peak) ** 2
+        return replace(comparison, missed=stacked_variance(power, comparison.counted))
+
+
+def _own_missed(state: State, nuisance: NuisanceConfig) -> Missed:
+    """Return what the damper misses in its own tests."""
+    alone = [
+        model_compared(state.damper, test, float(test.displacement[0].real), test.temperature)
+        for test in averaged(state.prepared)
+    ]
+    return Missed.of(alone, nuisance) if alone else Missed(0.0, np.zeros(1))
+
+
+def _carried(damper: Damper, tests: Sequence[AveragedTest], voltage_within: float, nuisance: NuisanceConfig) -> Missed:
+    """Return what is missed of the tests of a state if a model carries each over from the nearest other one."""
+    partners = ((nearest_motion(test, tests, voltage_within), test) for test in tests)
+    found = [cycles_compared(damper, partner, test) for partner, test in partners if partner is not None]
+    return Missed.of(found, nuisance) if found else Missed.unknown()
 
 
 # --- What is found
@@ -277,10 +353,10 @@ class Findings:
             verdict = "ambiguous"
         told = list(dict.fromkeys(name for names in others.values() for name in names))
         if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
-            # Beside what has no name a change that has rivals is not supported by itself.
             verdict = "unexplained"
-            told = list(dict.fromkeys([*(c.name for c in reported if c.name in rivals), *told]))
-            reported = [change for change in reported if change.name not in rivals]
+            doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
+            told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
+            reported = [change for change in reported if change.name not in doubtful]
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
@@ -334,6 +410,10 @@ class Findings:
         if perhaps := self.search.perhaps(best):
             rivals[NOTHING] = perhaps
         return best, rivals
+
+    def _stands_out(self, best: Fitted, candidate: Candidate) -> bool:
+        """Whether a change makes more than what is left without a name, which may be of the same cause."""
+        return self.search.size_of(best, candidate) > self.search.left(best)
 
     def _next_test(self, best: Fitted, rivals: dict[str, list[Fitted]]) -> NextTest | None:
         """Return the test that tells the first change with rivals from these, in place or on the damper."""

@@ -151,6 +151,16 @@ def motion_distance(before: AveragedTest, after: AveragedTest) -> float:
     return float(away / max(np.linalg.norm(one[1:]), np.linalg.norm(other[1:])))
 
 
+def nearest_motion(test: AveragedTest, others: Sequence[AveragedTest], voltage_within: float) -> AveragedTest | None:
+    """Return the test of the same control signal whose frequency and amplitude are nearest in ratio; None without."""
+
+    def away(other: AveragedTest) -> float:
+        amplitude, own = (float(np.abs(t.displacement[1])) for t in (test, other))
+        return float(np.hypot(np.log(test.frequency / other.frequency), np.log(amplitude / own)))
+
+    return min((t for t in others if t is not test and _same_level(t, test, voltage_within)), key=away, default=None)
+
+
 def paired(
     before: Sequence[AveragedTest], after: Sequence[AveragedTest], voltage_within: float, temperature_within: float
 ) -> list[tuple[int, int]]:
@@ -234,6 +244,9 @@ class Comparison:
     """[m] in the first state's records."""
     amplitude: float
     """Half the stroke [m]."""
+    missed: Array | None = None
+    """(2 H + 1,) mean square that the model may miss where it stands for the first state [N^2]; None where the motions
+    are equal."""
 
     @cached_property
     def difference(self) -> Array:

@@ -33,10 +33,6 @@ DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
 """Shares of the difference without a name that are tried, from nothing to all of it."""
 LEAST_VARIANCE = 1e-10
 """Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
-BEYOND_TESTED = 2.0
-"""Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
-
-Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
@@ -64,8 +60,7 @@ class Likelihood:
     comparisons: tuple[Comparison, ...]
     nuisance: NuisanceConfig
     known_discrepancy: float
-    """Share of the force that the damper of the first state misses in its own tests. It misses as much of a difference
-    that it computes, and more of motions in which it was not tested."""
+    """Share of the force that the damper of the first state misses in its own tests, and of a difference as well."""
 
     @cached_property
     def size(self) -> int:
@@ -73,9 +68,9 @@ class Likelihood:
         return sum(c.difference.size for c in self.comparisons)
 
     @cached_property
-    def _shapes(self) -> tuple[tuple[Array, Array], ...]:
-        """(2 H + 1,) mean square of difference and force in the octave about every harmonic [N^2]."""
-        return tuple((_by_octave(c.measured - c.reference), _by_octave(c.reference)) for c in self.comparisons)
+    def _shapes(self) -> tuple[Array, ...]:
+        """(2 H + 1,) mean square of the difference in the octave about every harmonic [N^2]."""
+        return tuple(_by_octave(c.measured - c.reference) for c in self.comparisons)
 
     @cached_property
     def columns(self) -> tuple[Array, ...]:
@@ -92,19 +87,15 @@ class Likelihood:
     def diagonal(self, at: int, scatter: Scatter) -> Array:
         """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
         c = self.comparisons[at]
-        missed = (scatter.discrepancy**2 + self.known_discrepancy**2) * self._shapes[at][0]
-        return np.asarray(c.variance + missed + self.missed_by_model(at) + LEAST_VARIANCE * c.peak**2)
+        missed = (scatter.discrepancy**2 + self.known_discrepancy**2) * self._shapes[at]
+        # A damper misses the same in all tests that it stands for, so that their number does not average it out.
+        alike = sum(each.before is None for each in self.comparisons)
+        return np.asarray(c.variance + missed + alike * self.missed_by_model(at) + LEAST_VARIANCE * c.peak**2)
 
     def missed_by_model(self, at: int) -> Array:
-        """Return (2 H + 1,) variance by what the damper of the first state misses where it stands for a test [N^2].
-
-        It misses the same in all tests, so that their number does not average it out.
-        """
-        c = self.comparisons[at]
-        if c.before is not None:
-            return np.zeros(c.difference.size)
-        alike = sum(each.before is None for each in self.comparisons)
-        return np.asarray(alike * (BEYOND_TESTED * self.known_discrepancy) ** 2 * self._shapes[at][1])
+        """Return (2 H + 1,) mean square that the damper of the first state misses where it stands for a test [N^2]."""
+        missed = self.comparisons[at].missed
+        return np.zeros(self.comparisons[at].difference.size) if missed is None else missed
 
     def own_of_tests(self, residuals: Sequence[Array], scatter: Scatter) -> list[Array]:
         """Return (2 H + 1,) what of each residual the test's own offset, gain, delay and jumps explain [N].

@@ -282,25 +282,33 @@ class Search:
 
     @cached_property
     def _adoptable(self) -> float:
-        """R.m.s. force from which a change is adopted: what the model misses of others is seldom as much."""
-        return max(self.visible, self._missed(LEVEL))
+        """R.m.s. force from which a change is adopted.
+
+        What the model misses of others is seldom as much, nor what it misses of the tests that it stands for.
+        """
+        return max(self.visible, LEVEL * self._missed_of_difference, self._hidden)
+
+    @property
+    def _possible(self) -> float:
+        """R.m.s. force from which a change is possible: what the model misses of others is usually less."""
+        return max(self.visible, self._missed_of_difference)
+
+    @cached_property
+    def _missed_of_difference(self) -> float:
+        """R.m.s. force that the model misses of the difference, each test in units of its peak: the same share."""
+        known, comparisons = self.regression.likelihood.known_discrepancy, self.regression.comparisons
+        return known * self._over_tests([float(c.difference @ c.difference) / c.peak**2 for c in comparisons])
 
     @cached_property
     def _hidden(self) -> float:
-        """R.m.s. force below which a change may be what the model misses of others, each test in units of its peak."""
-        return self._missed(1.0)
+        """R.m.s. force that the model misses of the difference, and of the tests that it stands for, in such units."""
+        missed = [float(np.sum(self.regression.likelihood.missed_by_model(i))) for i, _ in enumerate(self._peaks)]
+        through = self._over_tests([m / peak**2 for m, peak in zip(missed, self._peaks, strict=True)])
+        return float(np.hypot(self._missed_of_difference, through))
 
-    def _missed(self, errors: float) -> float:
-        """Return the r.m.s. force that the model may miss, each test in units of its peak.
-
-        A damper that misses a share of the force misses that share of a difference, up to so many standard errors of
-        it; of a test that it stands for, of the force.
-        """
-        known, squares = errors * self.regression.likelihood.known_discrepancy, []
-        for i, c in enumerate(self.regression.comparisons):
-            missed = float(np.sum(self.regression.likelihood.missed_by_model(i)))
-            squares.append((known**2 * float(c.difference @ c.difference) + missed) / c.peak**2)
-        return self._over_tests(squares)
+    @property
+    def _peaks(self) -> list[float]:
+        return [c.peak for c in self.regression.comparisons]
 
     def size_of(self, fitted: Fitted, candidate: Candidate) -> float:
         """Return the r.m.s. force that a change makes beside the others, each test in units of its peak."""
@@ -358,7 +366,7 @@ class Search:
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
         near = [f for f in fits if self._is_rival(f, best, less)]
-        return [fitted for fitted in near if self._admissible(fitted, self._least)]
+        return [fitted for fitted in near if self._admissible(fitted, self._possible)]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or as good where much has no name.
@@ -377,7 +385,7 @@ class Search:
         """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
         if len(best.candidates) >= MOST_CHANGES:
             return []
-        added = self._additions(best, self._least)
+        added = self._additions(best, self._possible)
         more = [f for f in added if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
         enough = best.bic + self.adopt_bic + self.rival_bic
         if not more or more[0].bic > enough:

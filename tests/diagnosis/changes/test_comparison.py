@@ -201,3 +201,39 @@ def test_a_fluid_that_thins_beside_a_yield_that_rounds_is_named(rng: np.random.G
     before = campaign(damper, rng)
     changes = found(before, campaign(damper.with_effect("shear_thinning", {"n": 0.8}), rng))
     assert "shear_thinning" in names_told(changes)
+
+
+def test_hum_that_stands_in_every_cycle_hides_no_change(rng: np.random.Generator) -> None:
+    """60 Hz is the twentieth harmonic of 3 Hz: no scatter between cycles tells of it, and it differs from run to run."""
+
+    def humming(records: tuple[Record, ...]) -> list[Record]:
+        phases = rng.uniform(0.0, 2.0 * np.pi, len(records))
+        return [
+            replace(r, force=r.force + 10.0 * np.sin(120.0 * np.pi * r.time + phase))
+            for r, phase in zip(records, phases, strict=True)
+        ]
+
+    damper, motions = drawn_damper(rng), ((3.0, 0.01), (3.0, 0.02))
+    before, after = (campaign(d, rng, motions) for d in (damper, scaled(damper, T0_N=1.03)))
+    changes = found(humming(before), humming(after))
+    assert names(changes) == names(found(before, after)) == ["T0"]
+    assert changes.difference.left_N == pytest.approx(found(before, after).difference.left_N, rel=0.2)
+
+
+def test_what_the_model_misses_is_carried_over_from_the_nearest_motion(rng: np.random.Generator) -> None:
+    """In motions not run before, a damper alone lays what it misses to other laws than the one that changed."""
+
+    def outside(records: tuple[Record, ...]) -> list[Record]:
+        return [
+            replace(r, force=r.force + 60.0 * np.sin(200.0 * r.displacement) * np.tanh(8.0 * r.velocity))
+            for r in records
+        ]
+
+    for draw in rng.spawn(4):
+        damper = drawn_damper(draw)
+        after = campaign(scaled(damper, T0_N=1.15), draw, motions=((1.6, 0.02), (1.6, 0.028)))
+        changes = found(outside(campaign(damper, draw)), outside(after))
+        assert changes.compared == "model"
+        assert "T0" in names_told(changes)
+        assert names(changes) in ([], ["T0"])
+        assert all(inside(change, 1.15) for change in changes.changes if change.name == "T0")
