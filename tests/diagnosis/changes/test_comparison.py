@@ -204,7 +204,7 @@ def test_a_fluid_that_thins_beside_a_yield_that_rounds_is_named(rng: np.random.G
 
 
 def test_hum_that_stands_in_every_cycle_hides_no_change(rng: np.random.Generator) -> None:
-    """60 Hz is the twentieth harmonic of 3 Hz: no scatter between cycles tells of it, and it differs from run to run."""
+    """60 Hz is the twentieth harmonic of 3 Hz: no scatter of cycles tells of it, and it differs from run to run."""
 
     def humming(records: tuple[Record, ...]) -> list[Record]:
         phases = rng.uniform(0.0, 2.0 * np.pi, len(records))
