@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.fit.element_coordinates import LARGEST, LARGEST_PRE_SLIP, ElementCoordinates
+from pzd.fit.least_squares import minimise
 from pzd.identification.config import EvolutionaryConfig
 from pzd.identification.prepared_record import PreparedRecord
 from pzd.record import Array
@@ -243,6 +244,8 @@ _CACHED_POINTS = 2
 """Points whose forces are cached: the current one of a descent, and its last trial step."""
 TOLERANCE = 1e-12
 """Relative tolerance of the least squares on parameters and criterion."""
+EVALUATIONS = 100
+"""Most evaluations of a descent: from a start near the valley it takes ten."""
 
 
 def fit_separable(objective: Objective) -> Fit:
@@ -314,8 +317,6 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     ------
     KnownOptimum : as soon as the criterion reaches the known one, which saves the rest of the way
     """
-    from scipy.optimize import least_squares
-
     norm = np.sqrt(objective.energy)
     begin, high = objective.to_search(start), objective.coordinates.high
 
@@ -349,16 +350,14 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     def slopes_at(x: Array) -> Array:
         return at(x)[1][:, :free]
 
-    found = least_squares(
+    found = minimise(
         residuals_at,
         np.clip(begin, 1e-9, high - 1e-9)[:free],
-        jac=slopes_at,
-        bounds=(np.zeros(free), high[:free]),
-        x_scale="jac",
-        xtol=TOLERANCE,
-        ftol=TOLERANCE,
-        gtol=TOLERANCE,
-        max_nfev=100,
+        slopes_at,
+        (np.zeros(free), high[:free]),
+        precision=TOLERANCE,
+        evaluations=EVALUATIONS,
+        size=objective.measured.size,
     )
     return _settled(objective, np.concatenate([found.x, begin[free:]]), at(found.x)[0])
 

@@ -19,6 +19,7 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion, parts_of_steps
+from pzd.fit.least_squares import minimise
 from pzd.identification import bingham_fit
 from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
 from pzd.identification.condition import parameter_rows
@@ -151,8 +152,6 @@ def _dwells(record: Record, node: float, window: float) -> NDArray[np.bool_]:
 
 def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bingham]:
     """Find the optimum over all free nodes together by trust-region least squares."""
-    from scipy.optimize import least_squares
-
     constant, norm = objective.constant, np.sqrt(objective.constant.energy)
     low, high = (np.tile(b, len(starts)) for b in (LEAST_COORDINATES, constant.coordinates.high))
 
@@ -170,16 +169,9 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
         return np.asarray(-np.hstack(own) / norm)
 
     start = np.concatenate([constant.to_search(s) for s in starts])
-    found = least_squares(
-        residuals_at,
-        np.clip(start, low + 1e-9, high - 1e-9),
-        jac=slopes_at,
-        bounds=(low, high),
-        x_scale="jac",
-        xtol=bingham_fit.TOLERANCE**0.75,
-        ftol=bingham_fit.TOLERANCE**0.75,
-        gtol=bingham_fit.TOLERANCE,
-        max_nfev=60,
+    start = np.clip(start, low + 1e-9, high - 1e-9)
+    found = minimise(
+        residuals_at, start, slopes_at, (low, high), precision=PRECISION, evaluations=bingham_fit.EVALUATIONS
     )
     return parameters(found.x)
 
@@ -267,6 +259,8 @@ def node_weights(nodes: Array, voltage: Array) -> Array:
 
 # --- Criterion (4) with parameters piecewise linear in the voltage ---
 
+PRECISION = 1e-9
+"""Relative tolerance of the least squares: that of the slopes by difference quotients bounds how near it comes."""
 DIFFERENCE = 1e-5
 """Step of the difference quotients, as a share of the parameter; for T0 of at least a hundredth of the peak force."""
 INTEGRATION = 1e-10
