@@ -31,9 +31,10 @@ from pzd.schema.errors import FilesError
 NAME = "certificate.json"
 ALIKE = 1e-6
 """Largest difference, as a share of the peak, of the same force: a thousand pieces at their tolerance."""
-_RAMP = 1e-10
+_RAMP = 1e-11
 """Time in which an input that is held goes from one value to the next in `respond`, where inputs are linear [s]: no
-valve follows it, and no rounding of the time shows."""
+valve follows it, the rod of a rigid damper goes no way in it that its force shows, and it is more than the rounding of
+hours."""
 
 Run = Callable[[Content, Motion], Array]
 """Returns the (n,) force [N] of what was exported at the samples of a motion."""
@@ -53,8 +54,9 @@ def held(motion: Motion) -> tuple[Motion, Rows]:
     """Return the motion with its inputs held over each step, for `respond`, and the samples at the end of each step."""
     steps = np.diff(motion.time)
     speed = np.diff(motion.displacement) / steps
-    time = np.column_stack([motion.time[:-1] + _RAMP, motion.time[1:]]).ravel()
-    time[0] = motion.time[0]
+    since = motion.time - motion.time[0]
+    time = np.column_stack([since[:-1] + _RAMP, since[1:]]).ravel()
+    time[0] = 0.0
     gone = np.column_stack([np.append(0.0, np.full(steps.size - 1, _RAMP)), steps]) * speed[:, np.newaxis]
     x = (motion.displacement[:-1, np.newaxis] + gone).ravel()
     voltage, temperature = (None if c is None else np.repeat(c[:-1], 2) for c in (motion.voltage, motion.temperature))

@@ -290,6 +290,10 @@ def no_exchange(damper: Damper) -> str | None:
             ]
             if any(rates):
                 return f"{effect.name} follows the rate of the control signal, which a solver does not give"
+    for effect in acting("branch"):
+        values = [damper.effects.get(effect.name, {}).get(p.name, p.neutral) for p in effect.parameters]
+        if _is_on(effect, damper) and any(isinstance(one, tuple) and len(set(one)) > 1 for one in values):
+            return f"{effect.name} changes with the control signal, by whose way its memory goes"
     return None
 
 
