@@ -62,6 +62,7 @@ def followed_over(
     rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes)]
     judged = [_judged(row, changes.tolerance) for row in rows]
     passes = [row.pass_ for row in judged if _limits(row, changes.tolerance) is not None]
+    open_ = [name for name in changes.tolerance if name not in {_quantity(row) for row in rows}]
     verdict = max((result.verdict for result in results), key=WORST.index)
     same = [{(u.name, u.parameter) for u in result.unchanged} for result in results]
     course = Course(
@@ -75,9 +76,11 @@ def followed_over(
         unchanged=tuple(u for u in results[-1].unchanged if all((u.name, u.parameter) in each for each in same)),
         rivals=tuple(dict.fromkeys(name for result in results for name in result.rivals)),
         reason="; ".join(
-            [f"{r.to}: {r.verdict}" for r in results] + [line for row in judged for line in _leaves(row, states)]
+            [f"{r.to}: {r.verdict}" for r in results]
+            + [line for row in judged for line in _leaves(row, states)]
+            + [f"{name} changed in no state, so that it is not held against its limits" for name in open_]
         ),
-        pass_=_together(passes),
+        pass_=_together([*passes, *(None for _ in open_)]),
     )
     return Followed(course, tuple(dict.fromkeys(line for state in states for line in state.undetermined)))
 
@@ -187,8 +190,12 @@ def _leaves(row: CourseRow, states: Sequence[State]) -> Iterator[str]:
     """Yield the sentence that names the first state outside the limits."""
     outside = [state.name for i, state in enumerate(states) if row.within(i) is False]
     if outside:
-        name = row.name if row.name == row.parameter else f"{row.name}.{row.parameter}"
-        yield f"{name} is outside its limits from {outside[0]} on"
+        yield f"{_quantity(row)} is outside its limits from {outside[0]} on"
+
+
+def _quantity(row: CourseRow) -> str:
+    """Return the name of a quantity as `changes.tolerance` has it."""
+    return row.name if row.name == row.parameter else f"{row.name}.{row.parameter}"
 
 
 def _together(passes: Sequence[bool | None]) -> bool | None:

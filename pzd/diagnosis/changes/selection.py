@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
+from pzd.damper.confounders import known
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
 from pzd.diagnosis.changes.regression import LEVEL, USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
@@ -57,6 +57,13 @@ def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
         return start
     linear = np.array([not c.logarithmic for c in candidate.coordinates])
     return np.where(linear, start * np.clip(step[0], *SCALED), start)
+
+
+def _is_beside(name: str) -> bool:
+    """Whether a change acts beside the element: an offset of the stand, or a force whatever the element does."""
+    if name in ELEMENT_COLUMNS or name not in known():
+        return name == "load_cell_zero"
+    return known()[name].place in ("parallel", "branch")
 
 
 def _best_step(candidate: Candidate, columns: Array, r: Array) -> tuple[Array, Array]:
@@ -147,12 +154,12 @@ class Search:
         asked = [c for c in self.candidates if self._flexible or not c.flexible]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
-    def _additions(self, before: Fitted, least: float | None = None) -> list[Fitted]:
-        """Return the fits with one more change that is physical and makes at least so much force, the best first.
+    def _additions(self, before: Fitted, *, possible: bool = False) -> list[Fitted]:
+        """Return the fits with one more change that is physical and large enough to adopt, the best first.
 
-        Without a limit it is that from which a change is adopted.
+        Where it need only be possible it may be smaller.
         """
-        least = self._adoptable if least is None else least
+        least = self._possible if possible else self._adoptable
         promising = self._promising(before, self._tried(before), before.scatter)
         worth = [
             p
@@ -161,7 +168,7 @@ class Search:
         ]
         # What leaves more of the force than its absence, the tests taken to differ alike, does not explain it.
         tried = (self._with(before, p) for p in worth)
-        fits = [f for f in tried if self._admissible(f, least) and self.left(f) < self.left(before, f.scatter)]
+        fits = [f for f in tried if self._admissible(f, least(f)) and self.left(f) < self.left(before, f.scatter)]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
@@ -170,14 +177,15 @@ class Search:
     def run(self) -> Fitted:
         """Return the changes that explain the difference.
 
-        Flexible laws are asked where the others leave something clearly visible, and believed where they leave nothing.
+        Flexible laws are asked where the others leave something clearly visible, and believed where they leave nothing
+        of it: a force beside the element leaves no more than a law within would.
         """
         best = self._best_end()
-        if self.left(best) < AS_GOOD * self._least or not any(c.flexible for c in self.candidates):
+        if self.left(best) < AS_GOOD * self._least(best) or not any(c.flexible for c in self.candidates):
             return best
         self._flexible = True
         further = self._best_end()
-        self._flexible = self.leaves_nothing(further)
+        self._flexible = self.left(further) < max(self._least(further), self._least(best))
         return further if self._flexible else best
 
     def _best_end(self) -> Fitted:
@@ -198,11 +206,11 @@ class Search:
 
     def leaves_nothing(self, fitted: Fitted) -> bool:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
-        return self.left(fitted) < self._least
+        return self.left(fitted) < self._least(fitted)
 
     def _as_good(self, fitted: Fitted, best: Fitted) -> bool:
         """Whether a fit leaves no more than the best one may leave in its direction."""
-        return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden)
+        return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden(best))
 
     def left(self, fitted: Fitted, scatter: Scatter | None = None) -> float:
         """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks).
@@ -246,7 +254,7 @@ class Search:
                 less
                 for less, c in fewer
                 if best.bic - less.bic > self.adopt_bic
-                or self.size_of(best, c) < self._adoptable
+                or self.size_of(best, c) < self._adoptable(best)
                 or not self._predicts(best, c)
                 or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
             ]
@@ -275,36 +283,38 @@ class Search:
         by_cycles = [s for s, c in zip(squares, self.regression.comparisons, strict=True) if c.before is not None]
         return float(np.sqrt(np.mean(by_cycles or squares)))
 
-    @property
-    def _least(self) -> float:
-        """R.m.s. force from which something counts, each test in units of its peak."""
-        return max(self.visible, self._hidden)
+    def _least(self, fitted: Fitted) -> float:
+        """Return the r.m.s. force from which something counts, each test in units of its peak."""
+        return max(self.visible, self._hidden(fitted))
 
-    @cached_property
-    def _adoptable(self) -> float:
-        """R.m.s. force from which a change is adopted.
+    def _adoptable(self, fitted: Fitted) -> float:
+        """Return the r.m.s. force from which a change is adopted, each test in units of its peak.
 
         What the model misses of others is seldom as much, nor what it misses of the tests that it stands for.
         """
-        return max(self.visible, LEVEL * self._missed_of_difference, self._hidden)
+        return max(self.visible, LEVEL * self._missed_of_difference(fitted), self._hidden(fitted))
 
-    @property
-    def _possible(self) -> float:
-        """R.m.s. force from which a change is possible: what the model misses of others is usually less."""
-        return max(self.visible, self._missed_of_difference)
+    def _possible(self, fitted: Fitted) -> float:
+        """Return the r.m.s. force from which a change is possible: what the model misses of others is usually less."""
+        return max(self.visible, self._missed_of_difference(fitted))
 
-    @cached_property
-    def _missed_of_difference(self) -> float:
-        """R.m.s. force that the model misses of the difference, each test in units of its peak: the same share."""
-        known, comparisons = self.regression.likelihood.known_discrepancy, self.regression.comparisons
-        return known * self._over_tests([float(c.difference @ c.difference) / c.peak**2 for c in comparisons])
+    def _missed_of_difference(self, fitted: Fitted) -> float:
+        """Return the r.m.s. force that the model misses of the difference, each test in units of its peak.
 
-    @cached_property
-    def _hidden(self) -> float:
-        """R.m.s. force that the model misses of the difference, and of the tests that it stands for, in such units."""
+        A damper that misses a share of the force misses that share of what a change in it makes; a force beside it is
+        the same whatever it misses.
+        """
+        changed = [(c, float(x)) for c, x in zip(fitted.coordinates, fitted.values, strict=True) if _is_beside(c.name)]
+        beside = self.regression.response.of([c for c, _ in changed], [x for _, x in changed])
+        within = [c.difference - made for c, made in zip(self.regression.comparisons, beside, strict=True)]
+        squares = [float(d @ d) / peak**2 for d, peak in zip(within, self._peaks, strict=True)]
+        return self.regression.likelihood.known_discrepancy * self._over_tests(squares)
+
+    def _hidden(self, fitted: Fitted) -> float:
+        """Return the r.m.s. force that the model misses of the difference, and of the tests that it stands for."""
         missed = [float(np.sum(self.regression.likelihood.missed_by_model(i))) for i, _ in enumerate(self._peaks)]
         through = self._over_tests([m / peak**2 for m, peak in zip(missed, self._peaks, strict=True)])
-        return float(np.hypot(self._missed_of_difference, through))
+        return float(np.hypot(self._missed_of_difference(fitted), through))
 
     @property
     def _peaks(self) -> list[float]:
@@ -366,7 +376,7 @@ class Search:
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
         near = [f for f in fits if self._is_rival(f, best, less)]
-        return [fitted for fitted in near if self._admissible(fitted, self._possible)]
+        return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted))]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or as good where much has no name.
@@ -377,7 +387,7 @@ class Search:
             return fitted.bic <= best.bic
         if fitted.bic <= best.bic + self.rival_bic:
             return True
-        if self.left(best) < AS_GOOD * self._least:
+        if self.left(best) < AS_GOOD * self._least(best):
             return False
         return self._as_good(fitted, best) and AS_GOOD * self.left(fitted) <= self.left(less)
 
@@ -385,7 +395,7 @@ class Search:
         """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
         if len(best.candidates) >= MOST_CHANGES:
             return []
-        added = self._additions(best, self._possible)
+        added = self._additions(best, possible=True)
         more = [f for f in added if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
         enough = best.bic + self.adopt_bic + self.rival_bic
         if not more or more[0].bic > enough:
