@@ -69,7 +69,7 @@ true-dampers: $(DEV)  ## Hold the dampers of blind cases against their own recor
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/true_damper.py --cases 150
 
 .PHONY: bench
-bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour
+bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; a quarter of an hour
 	$(BIN)/python tests/studies/bench.py
 
 .PHONY: changes-study

@@ -2,7 +2,7 @@
 
     python tests/studies/bench.py                       all; into runs/bench/bench.json
     python tests/studies/bench.py kernels stages        the force of a damper; fit, ride and comfort
-    python tests/studies/bench.py waits files diagnose campaign engines
+    python tests/studies/bench.py waits files diagnose road engines campaign
 
 Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock,
 so that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from functools import partial
@@ -39,6 +40,7 @@ def parts(folder: Path) -> dict[str, Callable[[], Iterator[Row]]]:
         "waits": partial(bench_commands.waits, folder / "waits"),
         "files": partial(bench_commands.files, folder),
         "diagnose": partial(bench_commands.diagnoses, folder / "diagnose"),
+        "road": partial(bench_commands.road_hour, folder / "road"),
         "engines": bench_engines.rows,
         "campaign": partial(bench_commands.campaign, folder / "campaign"),
     }
@@ -47,14 +49,17 @@ def parts(folder: Path) -> dict[str, Callable[[], Iterator[Row]]]:
 def main() -> None:
     """Measure, print a table, write it as JSON."""
     found: list[Row] = []
+    start = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         known = parts(Path(name))
         for part in sys.argv[1:] or known:
+            begun = time.perf_counter()
             for row in known[part]():
                 row.say()
                 found.append(row)
-    met = sum(row.met is True for row in found)
-    sys.stdout.write(f"{met} of {sum(row.target is not None for row in found)} targets met\n")
+            sys.stdout.write(f"-- {part}: {time.perf_counter() - begun:.0f} s\n")
+    met, wanted = sum(row.met is True for row in found), sum(row.target is not None for row in found)
+    sys.stdout.write(f"{met} of {wanted} targets met, in {(time.perf_counter() - start) / 60.0:.1f} minutes\n")
     busy = os.getloadavg()[0]
     machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count(), "load": busy}
     versions = {"python": platform.python_version()} | {name: version(name) for name in ("numpy", "scipy", "numba")}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import yaml
 from bench_table import Row
 
 from pzd.damper.element import element_force
@@ -77,6 +78,9 @@ def waits(folder: Path) -> Iterator[Row]:
 
 
 FILES, ROWS = 1000, 10_000
+PART = 4
+"""A part of them, one in so many, tells how the time grows and what a second process is worth."""
+IDENTIFY_MB = 220.0
 RIG = """
 rig:
   files:
@@ -96,24 +100,26 @@ def files(folder: Path) -> Iterator[Row]:
         x = (0.01 + 0.02 * rng.random()) * np.sin(2.0 * np.pi * (0.5 + 2.0 * rng.random()) * t)
         force = element_force(x, 1e-3, 300.0 + 5.0 * voltage, 2700.0, 2e5, 0.0)
         force += 5.0 * rng.standard_normal(ROWS)
-        path = place / "files" / f"{'ab'[number % 2]}{number:04d}.csv"
+        path = place / "files" / f"{'abbb'[number % PART]}{number:04d}.csv"
         columns = np.column_stack([t, x, force, np.full(ROWS, voltage)])
         np.savetxt(path, columns, fmt="%.7g", delimiter=",", header=header, comments="")
-    for name, count in (("half", FILES // 2), ("many", FILES)):
-        (place / f"{name}.yaml").write_text(RIG.replace("*", "a*") if count < FILES else RIG, encoding="utf-8")
-    run("identify", place / "half.yaml", folder=place)  # compiles
-    half, half_by_two, two = (
+    for name, stems in (("few", "a00*"), ("part", "a*"), ("many", "*")):
+        (place / f"{name}.yaml").write_text(RIG.replace("*", stems), encoding="utf-8")
+    few = run("identify", place / "few.yaml", folder=place)  # compiles
+    few = run("identify", place / "few.yaml", "--force", folder=place)
+    part, part_by_two, two = (
         run("identify", place / f"{name}.yaml", "--force", "--runs", f"{name}-{jobs}", "--jobs", jobs, folder=place)
-        for name, jobs in (("half", 1), ("half", 2), ("many", 2))
+        for name, jobs in (("part", 1), ("part", 2), ("many", 2))
     )
     fitting = float(re.search(r"identify\s+done in ([\d.]+) s", two.said)[1])
-    exponent = float(np.log2(two.cpu / half_by_two.cpu))
+    exponent = float(np.log(two.cpu / part_by_two.cpu) / np.log(PART))
     about = f"{two.cpu:.3g} CPU-s; growth of time with files: exponent {exponent:.2f}"
     yield Row("1,000 rig CSVs of 10^4 rows to parameters.csv", two.wall, "s", 15.0, at_least=False, about=about)
     yield Row("  of which the stage identify", fitting, "s", 2.0, at_least=False)
-    yield Row("  half of them, with two processes beside one", half.wall / half_by_two.wall, "x", 1.7)
-    peaks = f"with half of the files {half_by_two.peak_MB:.0f} MB"
+    yield Row(f"  {FILES // PART} of them, with two processes beside one", part.wall / part_by_two.wall, "x", 1.7)
+    peaks = f"with {FILES // PART} files {part_by_two.peak_MB:.0f} MB"
     yield Row("  its largest process", two.peak_MB, "MB", about=peaks)
+    yield Row("  that of 25 files", few.peak_MB, "MB", IDENTIFY_MB, at_least=False)
 
 
 CAMPAIGNS = {"clean": 4.0, "rich": 20.0, "switching": 30.0}
@@ -148,6 +154,36 @@ def diagnoses(folder: Path) -> Iterator[Row]:
         exponent = float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
         about = ", ".join(f"{size}: {spent:.3g} CPU-s" for size, spent in zip(sizes, times, strict=True))
         yield Row(f"  growth with {what}, clean, exponent", exponent, "", 1.1, at_least=False, about=about)
+
+
+HOUR_S, HOUR_RIDES, HOUR_TARGET_S = 3600.0, 20, 240.0
+ROADS = 2
+"""Of the shorter rides, so that both processes have work."""
+PARTS_S = (300.0, 900.0)
+"""Lengths of the rides from which those of an hour are told."""
+
+
+def road_hour(folder: Path) -> Iterator[Row]:
+    """Twenty rides of an hour with two processes, told from two shorter ones on two roads."""
+    config = yaml.safe_load((STUDIES / "campaign" / "rides.yaml").read_text(encoding="utf-8"))
+    (road,) = config["simulate"]["roads"]
+    config["simulate"]["roads"] = [{**road, "seed": seed, "label": f"road{seed}"} for seed in range(1, ROADS + 1)]
+    folder.mkdir(exist_ok=True)
+    rides = folder / "rides.yaml"
+    rides.write_text(yaml.safe_dump(config), encoding="utf-8")
+
+    def ridden(seconds: float) -> Done:
+        long = ("--set", f"simulate.duration_s={seconds}")
+        return run("simulate", rides, *long, "--force", "--jobs", 2, folder=folder)
+
+    ridden(PARTS_S[0] / 10.0)  # compiles
+    few, many = (ridden(seconds) for seconds in PARTS_S)
+    each = (many.wall - few.wall) / (PARTS_S[1] - PARTS_S[0]) / ROADS
+    whole = many.wall + each * (HOUR_RIDES * HOUR_S - ROADS * PARTS_S[1])
+    exponent = float(np.log(many.cpu / few.cpu) / np.log(PARTS_S[1] / PARTS_S[0]))
+    about = f"{1e3 * each:.3g} us a ms of a ride; growth with its length: exponent {exponent:.2f}"
+    yield Row(f"one hour of road, {HOUR_RIDES} rides", whole, "s", HOUR_TARGET_S, at_least=False, about=about)
+    yield Row("  peak memory, 15 minutes", many.peak_MB, "MB", about=f"5 minutes: {few.peak_MB:.0f} MB")
 
 
 CAMPAIGN = {"identify": (2048, 128, "runs of 5 identifications"), "rides": (2048, 32, "rides of 60 s")}

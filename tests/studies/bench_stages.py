@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from bench_table import Row, once, pairs
 from scipy.integrate import solve_ivp
 from scipy.signal import bilinear_zpk, resample_poly, sosfilt, sosfreqz, zpk2sos
 
+import pzd
 from pzd.artefacts import Table
 from pzd.comfort.iso2631_1997 import evaluate, maximum_transient, vibration_dose
 from pzd.comfort.weighting import WK, response, weighted
@@ -162,6 +164,31 @@ def _some_table() -> Table:
     return table
 
 
+STIFF = pzd.Damper(
+    [
+        {"voltage_V": u, "T0_N": T0, "C_Ns_per_m": C, "k_N_per_m": k}
+        for u, T0, C, k in ((0.0, 110.0, 980.0, 9e6), (0.5, 520.0, 4500.0, 1.5e7), (1.0, 970.0, 6100.0, 1.2e7))
+    ],
+    {"second_branch": {"T0_2": 100.0, "k_2": 5e5}, "gas_spring": {"k_g": 700.0}},
+)
+"""Like the measured damper of UTFSM, current in the place of the voltage."""
+PREDICTED_S = (1.0, 3.0)
+"""Lengths of two rides, whose difference leaves out what it takes to begin."""
+PREDICTION_US = 150.0
+
+
+def prediction() -> Iterator[Row]:
+    """A ride by the predictive policy on a stiff damper with branches that remember."""
+
+    def ours(seconds: float) -> None:
+        pzd.ride(STIFF, road="sine", policy="comfort_predictive", duration=seconds)
+
+    ours(PREDICTED_S[0])  # compiles
+    few, many = (min(once(partial(ours, seconds)) for _ in range(3)) for seconds in PREDICTED_S)
+    each = 1e3 * (many - few) / (PREDICTED_S[1] - PREDICTED_S[0])
+    yield Row("comfort_predictive on a stiff damper, a ms of the ride", each, "us", PREDICTION_US, at_least=False)
+
+
 # ---------------------------------------------------------------- comfort
 
 RATE = 1000.0
@@ -221,4 +248,5 @@ def rows() -> Iterator[Row]:
     """All."""
     yield from fits()
     yield from rides()
+    yield from prediction()
     yield from comfort()
