@@ -24,6 +24,8 @@ _FAINT = 1e-6
 Reason: a displacement sensor is better than that, and a sweep fills its band as evenly as noise."""
 _STANDS_OUT = 3.0
 """Multiple of ln(n) times the mean that no power of white noise exceeds: of n powers one does so in n^2 records."""
+_LONG = 131_072
+"""Samples from which the memory and time of a transform matter."""
 
 
 def low_pass(values: Array, highest: float) -> Array:
@@ -116,11 +118,13 @@ def _reflected(values: Array) -> tuple[Array, Complex, Array]:
 
 
 def _of_fast_length(values: Array) -> Array:
-    """Continue a signal by its point reflection, as far as its transform needs to be of a fast length.
+    """Continue a long signal by its point reflection, as far as its transform needs to be of a fast length.
 
-    Another length, of large prime factors, takes up to ten times as long and as much memory. What is added, of long
-    signals at most 3 %, is what the reflection puts there anyway.
+    Another length, of large prime factors, takes ten times the memory and up to ten times as long. What is added, at
+    most 3 %, is what the reflection puts there anyway. A short one ends where it does: its last value holds the line.
     """
+    if values.size < _LONG:
+        return values
     from scipy.fft import next_fast_len
 
     more = int(next_fast_len(values.size - 1, real=True)) + 1 - values.size
