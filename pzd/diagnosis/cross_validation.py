@@ -20,7 +20,7 @@ from pzd.damper.parameter_rows import rows_per_voltage, with_rows
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
-from pzd.diagnosis.fit.least_squares import FitResult, StepWithout, fit, refit
+from pzd.diagnosis.fit.least_squares import FitResult, StepWithout, fit, newton_step, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
@@ -336,7 +336,7 @@ class CrossValidation(Folds):
         The noise of single samples is left out: tests that repeat count as their average cycles. A test that is alone
         at its voltage counts as it was fitted: its halves share its harmonics.
 
-        Equation: r_f + J_f d, d the step without the tests f of a fold, see `StepWithout`
+        Equation: r_f + J_f (A - J_f' J_f)^-1 J_f' r_f, A = J' J + P' P, f the tests of a fold, P the prior
                                                         Source: Allen 1974, Technometrics 16, 125-127, by groups
 
         Parameters
@@ -346,13 +346,16 @@ class CrossValidation(Folds):
         """
         ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
         slopes = np.split(fitted.jacobian.dense(), ends)
-        without = StepWithout.of(problem, fitted.residuals, fitted.jacobian, fitted.prior)
+        normal = sum((each.T @ each for each in slopes), fitted.prior.T @ fitted.prior)
         squares = np.array([r @ r for r in fitted.residuals])
         number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
         records = [number[o.name] for o in problem.observations]
         for tests in self.held_out_tests():
             members = [i for i, record in enumerate(records) if record in tests]
-            step = without.step({problem.observations[i].name for i in members})
+            if not members:
+                continue
+            held, left = (np.concatenate([of[i] for i in members]) for of in (slopes, fitted.residuals))
+            step = newton_step(normal - held.T @ held, held.T @ left)
             for i in members:
                 squares[i] = float(np.sum((fitted.residuals[i] + slopes[i] @ step) ** 2))
         entries = []
@@ -515,13 +518,13 @@ class CrossValidation(Folds):
         whole = without(self.no_samples)
         if whole is None:
             return lambda _: None
-        without_tests, start = StepWithout.at(whole, damper), whole.start_with(damper)
+        step = StepWithout.at(whole, damper)
         names = [p.record.name for p in self.campaign.prepared]
 
         def refitted(held_out: Sequence[Mask]) -> Damper | None:
             problem = without(held_out)
             gone = frozenset(name for name, mask in zip(names, held_out, strict=True) if mask.all())
-            return None if problem is None else _refitted(problem, damper, start + without_tests.step(gone))
+            return None if problem is None else _refitted(problem, damper, step.to(gone))
 
         return refitted
 

@@ -29,8 +29,7 @@ PRECISION = 1e-5
 Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bic` asks for; what is quoted goes on, see
 `polished`."""
 SMALLEST_SINGULAR = 1e-10
-"""Singular value of the normal equations of some tests below which they show no direction; those of all have a unit
-diagonal.
+"""Singular value of normal equations, scaled to a unit diagonal, below which they show no direction.
 
 Reason: far above rounding, far below what tests determine."""
 POLISHED_PRECISION = 1e-12
@@ -160,57 +159,51 @@ def polished(problem: Problem, fitted: FitResult) -> FitResult:
 
 @dataclass(frozen=True, eq=False)
 class StepWithout:
-    """The Gauss-Newton step to the optimum of all tests but some, by one linearisation with all.
-
-    It takes the slope of the kept tests themselves: that it is the negative of that of the others holds at an optimum
-    alone, and where the kept tests hardly tell a variable, the rest of a search would go there many times enlarged.
+    """The Gauss-Newton step from a damper to the optimum of all tests but some, by one linearisation with all.
 
     Equation: (sum_i J_i' J_i + P' P) d = -sum_i J_i' r_i, i the tests that are kept, P the prior
                                                         Source: Allen 1974, Technometrics 16, 125-127, by groups
     """
 
+    start: Array
+    """(p,) the damper in the units of the search."""
     normal: Mapping[str, Array]
     """(p, p) J' J of each test, by name."""
-    slope: Mapping[str, Array]
+    gradient: Mapping[str, Array]
     """(p,) J' r of each test."""
     prior: Array
     """(p, p) P' P."""
 
     @classmethod
-    def of(cls, problem: Problem, residuals: Sequence[Array], jacobian: BlockJacobian, prior: Array) -> StepWithout:
-        """Prepare the steps from a point.
-
-        Parameters
-        ----------
-        problem : all tests
-        residuals : (w,) of each at the point
-        jacobian : of all residuals
-        prior : (2 b, p) its Jacobian
-        """
-        names, ends = [o.name for o in problem.observations], np.cumsum([r.size for r in residuals])[:-1]
-        blocks = np.split(jacobian.dense(), ends)
+    def at(cls, problem: Problem, damper: Damper) -> StepWithout:
+        """Linearise the tests of a problem at a damper."""
+        start = problem.start_with(damper)
+        unknowns = problem.unknowns(tuple(damper.effects))
+        low, high = _bounds(problem, unknowns)
+        here = linearise(problem, unknowns, np.clip(start, low, high), (low, high))
+        names = [o.name for o in problem.observations]
+        ends = np.cumsum([r.size for r in here.residuals])[:-1]
+        slopes, prior = np.split(here.jacobian.dense(), ends), _prior(problem, len(unknowns))
         return cls(
-            {name: each.T @ each for name, each in zip(names, blocks, strict=True)},
-            {name: each.T @ r for name, each, r in zip(names, blocks, residuals, strict=True)},
+            start,
+            {name: each.T @ each for name, each in zip(names, slopes, strict=True)},
+            {name: each.T @ r for name, each, r in zip(names, slopes, here.residuals, strict=True)},
             prior.T @ prior,
         )
 
-    @classmethod
-    def at(cls, problem: Problem, damper: Damper) -> StepWithout:
-        """Prepare the steps from a damper."""
-        unknowns = problem.unknowns(tuple(damper.effects))
-        limits = _bounds(problem, unknowns)
-        here = linearise(problem, unknowns, np.clip(problem.start_with(damper), *limits), limits)
-        return cls.of(problem, here.residuals, here.jacobian, _prior(problem, len(unknowns)))
-
-    def step(self, gone: Collection[str]) -> Array:
-        """Return the (p,) step without some tests, in the units of the search; zero where no kept test shows any."""
+    def to(self, gone: Collection[str]) -> Array:
+        """Return the (p,) point that the step without some tests goes to; what no kept test shows stays."""
         kept = [name for name in self.normal if name not in gone]
         normal = sum((self.normal[name] for name in kept), self.prior)
-        slope = sum((self.slope[name] for name in kept), np.zeros(len(self.prior)))
-        size = np.sqrt(np.maximum(np.diag(sum(self.normal.values(), self.prior)), np.finfo(np.float64).tiny))
-        scaled = normal / np.outer(size, size)
-        return np.asarray(-np.linalg.lstsq(scaled, slope / size, rcond=SMALLEST_SINGULAR)[0] / size)
+        gradient = sum((self.gradient[name] for name in kept), np.zeros(self.start.size))
+        return self.start - newton_step(normal, gradient)
+
+
+def newton_step(normal: Array, gradient: Array) -> Array:
+    """Solve normal equations (p, p) for (p,) values, zero along directions that they do not show."""
+    size = np.sqrt(np.maximum(np.diag(normal), np.finfo(np.float64).tiny))
+    scaled = normal / np.outer(size, size)
+    return np.asarray(np.linalg.lstsq(scaled, gradient / size, rcond=SMALLEST_SINGULAR)[0] / size)
 
 
 def projected_out(frame: Array, values: Array) -> Array:
