@@ -20,7 +20,7 @@ from pzd.damper.parameter_rows import rows_per_voltage, with_rows
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
-from pzd.diagnosis.fit.least_squares import FitResult, StepWithout, fit, newton_step, refit
+from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
@@ -243,12 +243,11 @@ def interpolates_much_worse(one: PredictionError, other: PredictionError) -> boo
 REFIT_EVALUATIONS = 6
 """Evaluations of a refit without one fold.
 
-Reason: it begins one Gauss-Newton step from the optimum of all tests, which a fifth of them moves little."""
-PREDICTING_OFFSET = 0.1
-"""Distance to its optimum at which a fit ends that predicts [standard errors].
+Reason: it begins at the optimum of all tests, which a fifth of them moves little."""
+SMALLEST_SINGULAR = 1e-10
+"""Singular value of a fold's normal equations, scaled to a unit diagonal, below which it shows no direction.
 
-Reason: held-out tests tell a fit of p variables on n samples from the truth by p/n of their squares; a tenth of a
-standard error in every variable adds a hundredth of that."""
+Reason: far above rounding, far below what tests determine."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """Gives the damper refitted to all but the held-out samples; None where nothing is left."""
@@ -266,12 +265,6 @@ class CrossValidation(Folds):
     """A gap (r.m.s.) below this share of a test's peak force does not count."""
     _problems: dict[tuple[tuple[float | None, float | None], ...], Problem] = field(default_factory=dict, repr=False)
     """Problems of criterion (4) by voltages and temperatures of the base rows: of nothing else in a damper."""
-    _fits: dict[tuple[str, bytes], tuple[Problem, FitResult] | None] = field(
-        default_factory=dict, init=False, repr=False
-    )
-    """Fits by criterion (4), by damper and held-out samples: the search comes back to the same dampers."""
-    _errors: dict[tuple[str, str], PredictionError] = field(default_factory=dict, init=False, repr=False)
-    """Prediction errors, by what was asked for and damper."""
 
     def baseline_error(self) -> PredictionError:
         """Compute the held-out prediction error of the baseline, refitted by criterion (4) as identify fits it."""
@@ -279,16 +272,12 @@ class CrossValidation(Folds):
 
     def held_out_error(self, damper: Damper) -> PredictionError:
         """Compute the held-out prediction error of a damper, refitted by the likelihood without each fold."""
-        return self._once("likelihood", damper, lambda: self._fold_errors(self._refit_by_likelihood(damper)))
+        return self._fold_errors(self._refit_by_likelihood(damper))
 
     def error_by_criterion(self, damper: Damper) -> PredictionError:
         """Compute the held-out prediction error of a damper, refitted by criterion (4) without each fold."""
-
-        def computed() -> PredictionError:
-            whole = self.fit_by_criterion(damper, self.no_samples)
-            return self._fold_errors(self._refit_by_criterion(whole[1].damper if whole else damper))
-
-        return self._once("criterion", damper, computed)
+        whole = self.fit_by_criterion(damper, self.no_samples)
+        return self._fold_errors(self._refit_by_criterion(whole[1].damper if whole else damper))
 
     @cached_property
     def baseline_interpolation_error(self) -> PredictionError:
@@ -303,19 +292,8 @@ class CrossValidation(Folds):
         damper : with the effects to be tried
         by_criterion : whether to refit by criterion (4) instead of the likelihood
         """
-
-        def computed() -> PredictionError:
-            refit = self._refit_by_criterion(damper) if by_criterion else self._refit_by_likelihood(damper)
-            return PredictionError.concatenated([self._error_without_voltage(i, refit) for i in self.interior_groups()])
-
-        return self._once(f"left-out voltages, {by_criterion=}", damper, computed)
-
-    def _once(self, asked: str, damper: Damper, compute: Callable[[], PredictionError]) -> PredictionError:
-        """Return what was computed for a damper, or compute it."""
-        key = asked, damper.model_dump_json()
-        if key not in self._errors:
-            self._errors[key] = compute()
-        return self._errors[key]
+        refit = self._refit_by_criterion(damper) if by_criterion else self._refit_by_likelihood(damper)
+        return PredictionError.concatenated([self._error_without_voltage(i, refit) for i in self.interior_groups()])
 
     def fit_by_criterion(self, damper: Damper, held_out: Sequence[Mask]) -> tuple[Problem, FitResult] | None:
         """Fit a damper with its effects by criterion (4) to all but the held-out samples.
@@ -324,11 +302,8 @@ class CrossValidation(Folds):
         -------
         the least-squares problem and its solution; None where nothing is left to fit
         """
-        key = damper.model_dump_json(), b"".join(mask.tobytes() for mask in held_out)
-        if key not in self._fits:
-            problem = self._criterion_problem(damper)(held_out)
-            self._fits[key] = None if problem is None else (problem, refit(problem, damper, enough=PREDICTING_OFFSET))
-        return self._fits[key]
+        problem = self._criterion_problem(damper)(held_out)
+        return None if problem is None else (problem, refit(problem, damper))
 
     def error_to_first_order(self, problem: Problem, fitted: FitResult) -> PredictionError:
         """Estimate the held-out prediction error of an optimum by criterion (4) without refits, to compare dampers by.
@@ -347,6 +322,7 @@ class CrossValidation(Folds):
         ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
         slopes = np.split(fitted.jacobian.dense(), ends)
         normal = sum((each.T @ each for each in slopes), fitted.prior.T @ fitted.prior)
+        size = np.sqrt(np.maximum(np.diag(normal), np.finfo(np.float64).tiny))
         squares = np.array([r @ r for r in fitted.residuals])
         number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
         records = [number[o.name] for o in problem.observations]
@@ -355,7 +331,8 @@ class CrossValidation(Folds):
             if not members:
                 continue
             held, left = (np.concatenate([of[i] for i in members]) for of in (slopes, fitted.residuals))
-            step = newton_step(normal - held.T @ held, held.T @ left)
+            rest = (normal - held.T @ held) / np.outer(size, size)
+            step = np.linalg.lstsq(rest, held.T @ left / size, rcond=SMALLEST_SINGULAR)[0] / size
             for i in members:
                 squares[i] = float(np.sum((fitted.residuals[i] + slopes[i] @ step) ** 2))
         entries = []
@@ -508,25 +485,11 @@ class CrossValidation(Folds):
 
     def _refit_by_likelihood(self, damper: Damper) -> _Refit:
         problem = evidence_of(self.campaign, damper).whole
-        return self._refit(damper, lambda held_out: _reduced_problem(self.campaign, problem, damper, held_out))
+        return lambda held_out: _refitted(_reduced_problem(self.campaign, problem, damper, held_out), damper)
 
     def _refit_by_criterion(self, damper: Damper) -> _Refit:
-        return self._refit(damper, self._criterion_problem(damper))
-
-    def _refit(self, damper: Damper, without: Callable[[Sequence[Mask]], Problem | None]) -> _Refit:
-        """Return the refit of a damper: one linearisation with all tests gives every fold the point where it begins."""
-        whole = without(self.no_samples)
-        if whole is None:
-            return lambda _: None
-        step = StepWithout.at(whole, damper)
-        names = [p.record.name for p in self.campaign.prepared]
-
-        def refitted(held_out: Sequence[Mask]) -> Damper | None:
-            problem = without(held_out)
-            gone = frozenset(name for name, mask in zip(names, held_out, strict=True) if mask.all())
-            return None if problem is None else _refitted(problem, damper, step.to(gone))
-
-        return refitted
+        problem = self._criterion_problem(damper)
+        return lambda held_out: _refitted(problem(held_out), damper)
 
     def _criterion_problem(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
         """Return the problem of criterion (4) as a function of the held-out samples."""
@@ -567,10 +530,11 @@ def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_
     return replace(problem, observations=tuple(kept)) if kept else None
 
 
-def _refitted(problem: Problem, damper: Damper, start: Array) -> Damper:
-    """Refit a damper from a starting point, without the base rows for which no test is left."""
-    fitted = fit(problem, tuple(damper.effects), start, REFIT_EVALUATIONS, enough=PREDICTING_OFFSET)
-    found, rows = fitted.damper, {o.base_row for o in problem.observations}
+def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
+    """Refit a damper, without the base rows for which no test is left."""
+    if problem is None:
+        return None
+    found, rows = refit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
     return found if -1 in rows else with_rows(found, [found.base[i] for i in sorted(rows)])
 
 

@@ -96,7 +96,6 @@ def minimise(
     largest_offset: float = LARGEST_OFFSET,
     resolution: float = 0.0,
     size: int | None = None,
-    enough: float = 0.0,
 ) -> Optimum:
     """Minimise a sum of squares from a starting point within limits, and judge what was found.
 
@@ -114,8 +113,6 @@ def minimise(
     largest_offset : of an optimum that counts as converged
     resolution : size of a residual up to which the model is computed at random; an exact fit leaves no more
     size : number of residuals, where n rows with the same inner products stand for more
-    enough : relative offset within which the search ends without another evaluation, which would only show that there
-        is nothing to gain; for a Jacobian that is at hand where the residuals are
 
     Raises
     ------
@@ -126,16 +123,12 @@ def minimise(
     low, high = bounds if bounds is not None else (np.full(start.size, -np.inf), np.full(start.size, np.inf))
     if start.size == 0:
         left = np.asarray(residuals(start), dtype=np.float64)
-        limits = _Limits(low, high, largest_offset, resolution, size)
+        limits = _Limits(low, high, largest_offset, resolution, size or left.size)
         return _judged(start, left, np.zeros((left.size, 0)), limits, 1)
     slopes: Any = jacobian or "3-point"
-    limits = _Limits(low, high, largest_offset, resolution, size)
-    begin, near = np.clip(start, low, high), _NearEnough(jacobian, limits, enough)
-    if near.at(begin, residuals, 1):
-        return near.reached[0]
     found = least_squares(
         residuals,
-        begin,
+        np.clip(start, low, high),
         jac=slopes,
         bounds=(low, high),
         x_scale="jac",
@@ -143,10 +136,8 @@ def minimise(
         xtol=precision,
         gtol=precision,
         max_nfev=evaluations,
-        callback=near,
     )
-    if near.reached:
-        return near.reached[0]
+    limits = _Limits(low, high, largest_offset, resolution, found.fun.size if size is None else size)
     best = _judged(found.x, found.fun, np.asarray(found.jac), limits, int(found.nfev))
     if jacobian is None or found.status <= 0:
         return best
@@ -183,29 +174,7 @@ class _Limits:
     high: Array
     offset: float
     resolution: float
-    count: int | None
-    """Residuals that the rows stand for; None for as many as there are."""
-
-
-class _NearEnough:
-    """Ends a search where it is near enough to an optimum: a callback of the solver after each step."""
-
-    def __init__(self, jacobian: Callable[[Array], Array] | None, limits: _Limits, enough: float) -> None:
-        self._jacobian, self._limits, self._enough = jacobian, limits, enough
-        self.reached: list[Optimum] = []
-
-    def __call__(self, intermediate_result: Any) -> None:
-        at = intermediate_result
-        if self.at(at.x, lambda _: at.fun, int(at.nfev)):
-            raise StopIteration
-
-    def at(self, x: Array, residuals: Callable[[Array], Array], evaluations: int) -> bool:
-        """Whether a point is near enough; it then stands in `reached`."""
-        if self._jacobian is None or self._enough <= 0.0:
-            return False
-        here = _judged(x, residuals(x), np.asarray(self._jacobian(x)), self._limits, evaluations)
-        self.reached += [here] if here.offset <= self._enough else []
-        return bool(self.reached)
+    size: int
 
 
 def _judged(x: Array, residuals: Array, jacobian: Array, limits: _Limits, evaluations: int) -> Optimum:
@@ -217,8 +186,8 @@ def _judged(x: Array, residuals: Array, jacobian: Array, limits: _Limits, evalua
     if not (np.all(np.isfinite(residuals)) and np.all(np.isfinite(jacobian))):
         nowhere, reason = np.zeros(x.size, dtype=np.bool_), "the residuals or their derivatives are not finite"
         return Optimum(x, residuals, jacobian, evaluations, np.inf, np.inf, nowhere, (), reason)
-    size, norms = limits.count or residuals.size, np.linalg.norm(jacobian, axis=0)
-    spread = float(np.linalg.norm(residuals)) / np.sqrt(max(size - x.size, 1))
+    norms = np.linalg.norm(jacobian, axis=0)
+    spread = float(np.linalg.norm(residuals)) / np.sqrt(max(limits.size - x.size, 1))
     at_limit = _at_limit(x, residuals @ jacobian, norms, (limits.low, limits.high), spread)
     free = np.flatnonzero(~at_limit)
     scaled = jacobian[:, free] / np.where(norms[free] > 0.0, norms[free], 1.0)
@@ -230,9 +199,9 @@ def _judged(x: Array, residuals: Array, jacobian: Array, limits: _Limits, evalua
     missing = free.size - int(np.count_nonzero(kept))
     condition = np.inf if missing else largest / float(sizes[-1]) if free.size else 1.0
     along = left.T @ triangle[: free.size, -1]
-    rest = float(np.linalg.norm(triangle[free.size :, -1])) / np.sqrt(max(size - free.size, 1))
+    rest = float(np.linalg.norm(triangle[free.size :, -1])) / np.sqrt(max(limits.size - free.size, 1))
     # An exact fit leaves rounding alone, which is orthogonal to nothing.
-    rounding = ROUNDING * float(np.linalg.norm(np.abs(jacobian) @ np.abs(x))) / np.sqrt(max(size, 1))
+    rounding = ROUNDING * float(np.linalg.norm(np.abs(jacobian) @ np.abs(x))) / np.sqrt(max(limits.size, 1))
     towards = float(np.linalg.norm(along)) / np.sqrt(max(free.size, 1))
     least = max(rest, limits.resolution)
     offset = towards / least if least > 0.0 else np.inf if towards > rounding else 0.0

@@ -13,7 +13,7 @@ from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cross_validation_of, predicts_worse
-from pzd.diagnosis.fit.least_squares import StepWithout, fit, search_errors
+from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.verdict import no_prediction_note
 from pzd.record import Record
 
@@ -209,33 +209,3 @@ def test_to_first_order_each_test_is_predicted_as_by_a_refit_without_its_fold(rn
     assert (quick.criterion or 0.0) > 1.1 * seen.sum() / energy.sum()
     order = [slow.records.index(i) for i in quick.records]
     assert quick.error / quick.energy == pytest.approx((slow.error / slow.energy)[order], rel=0.05)
-
-
-def test_the_step_without_some_tests_goes_to_their_optimum(rng: np.random.Generator) -> None:
-    """Springs and offsets are linear: one step is all, whichever tests are left out; with all of them it stands."""
-    truth = damper_of((0.0,), gas_spring={"k_g": 4000.0}, preload_offset={"F_0": 60.0})
-    records = sines(truth, rng, (0.0,), tests=[*TESTS, (1.0, 0.02), (1.0, 0.03)], cycles=3, jitter=0.03, noise=1e-3)
-    asked = validation(records, damper_of((0.0,)))
-    found = asked.fit_by_criterion(truth, asked.no_samples)
-    assert found is not None
-    problem, whole = found
-    step, names = StepWithout.at(problem, whole.damper), [o.name for o in problem.observations]
-    errors = search_errors(whole, slice(0, whole.optimum.size))
-    assert np.all(np.abs(step.to(()) - whole.optimum) < 0.2 * errors)
-    for gone in ({names[0]}, {names[1], names[4]}):
-        kept = replace(problem, observations=tuple(o for o in problem.observations if o.name not in gone))
-        exact = fit(kept, whole.effects, step.to(gone), enough=1e-4).optimum
-        moved = np.linalg.norm((exact - whole.optimum) / errors)
-        assert np.linalg.norm((step.to(gone) - exact) / errors) < 0.2 * moved
-
-
-def test_the_same_is_not_computed_twice(rng: np.random.Generator) -> None:
-    truth = damper_of(TWO, preload_offset={"F_0": 120.0})
-    asked = validation(sines(truth, rng, TWO, cycles=2), damper_of(TWO))
-    first = asked.error_by_criterion(truth)
-    spent = asked.campaign.budget.spent
-    assert asked.error_by_criterion(truth.model_copy()) is first
-    assert asked.fit_by_criterion(truth, asked.no_samples) is asked.fit_by_criterion(truth, asked.no_samples)
-    assert asked.campaign.budget.spent == spent
-    asked.error_by_criterion(damper_of(TWO, preload_offset={"F_0": 121.0}))
-    assert asked.campaign.budget.spent > spent

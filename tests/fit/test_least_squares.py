@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -118,37 +116,3 @@ def test_what_a_model_computes_at_random_is_no_distance_from_the_optimum(rng: np
 
     assert not minimise(residuals, np.ones(2), lambda _: columns).converged
     assert minimise(residuals, np.ones(2), lambda _: columns, resolution=jitter).converged
-
-
-def bent(rng: np.random.Generator) -> tuple[list[Array], Callable[[Array], Array], Callable[[Array], Array]]:
-    """A decay in noise, whose residuals are large: the points at which it was computed, residuals and Jacobian."""
-    time, seen = np.linspace(0.0, 3.0, 60), list[Array]()
-    values = 2.0 * np.exp(-1.3 * time) + 0.5 * rng.standard_normal(time.size)
-
-    def residuals(x: Array) -> Array:
-        seen.append(x.copy())
-        return np.asarray(x[0] * np.exp(-x[1] * time) - values)
-
-    return seen, residuals, lambda x: np.column_stack([np.exp(-x[1] * time), -time * x[0] * np.exp(-x[1] * time)])
-
-
-def test_a_search_ends_at_the_first_point_that_is_near_enough(rng: np.random.Generator) -> None:
-    seen, residuals, slopes = bent(rng)
-    exact = minimise(residuals, np.array([1.0, 0.5]), slopes)
-    seen.clear()
-    found = minimise(residuals, np.array([1.0, 0.5]), slopes, enough=0.1)
-    assert 1e-3 < found.offset <= 0.1
-    offsets = [minimise(residuals, x, slopes, enough=np.inf).offset for x in list(seen)]
-    assert all(offset > 0.1 for x, offset in zip(seen, offsets, strict=False) if not np.array_equal(x, found.x))
-    covariance = found.sum_of_squares / (found.residuals.size - 2) * np.linalg.inv(found.jacobian.T @ found.jacobian)
-    away = (found.x - exact.x) @ np.linalg.inv(covariance) @ (found.x - exact.x)
-    assert np.sqrt(away / 2.0) == pytest.approx(found.offset, rel=0.2)  # it is as far off as it says
-
-
-def test_a_search_that_begins_at_the_optimum_takes_one_evaluation(rng: np.random.Generator) -> None:
-    seen, residuals, slopes = bent(rng)
-    exact = minimise(residuals, np.array([1.0, 0.5]), slopes)
-    seen.clear()
-    found = minimise(residuals, exact.x, slopes, enough=0.01)
-    assert len(seen) == found.evaluations == 1
-    assert np.array_equal(found.x, exact.x)

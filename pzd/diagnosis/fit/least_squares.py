@@ -6,7 +6,7 @@ the logarithm of the likelihood, and fits of different effects can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -28,10 +28,6 @@ PRECISION = 1e-5
 
 Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bic` asks for; what is quoted goes on, see
 `polished`."""
-SMALLEST_SINGULAR = 1e-10
-"""Singular value of normal equations, scaled to a unit diagonal, below which they show no direction.
-
-Reason: far above rounding, far below what tests determine."""
 POLISHED_PRECISION = 1e-12
 """Relative change at which the search for an optimum that is quoted ends.
 
@@ -42,11 +38,6 @@ POLISHED_OFFSET = 1e-2
 """Largest distance to the optimum of what is quoted [standard errors].
 
 Reason: of a 95 % interval of 1.96 standard errors half a hundredth, less than its second digit shows."""
-COMPARED_OFFSET = 0.03
-"""Distance to its optimum at which a search ends whose outcome is compared with others [standard errors].
-
-Reason: where the residuals are large and the model bends, each further step only halves it; the misfit of p variables
-is then p/1000 of a mean square above its least."""
 PRIOR_DEVIATION = 1.5
 """Prior standard deviation of ln C and ln k about their starting values: fixes a row where the tests do not show it (C
 under an open relief valve, k of a soft drive), and nowhere else. Between values that no test shows there is none.
@@ -116,7 +107,6 @@ def fit(
     start: Array,
     evaluations: int = MOST_EVALUATIONS,
     precision: float = PRECISION,
-    enough: float = COMPARED_OFFSET,
 ) -> FitResult:
     """Fit a damper with some effects by trust-region least squares within the limits, from a starting point.
 
@@ -127,10 +117,9 @@ def fit(
     start : (3 b + e,) in the units of the search
     evaluations : of the model, at most
     precision : relative change of the sum of squares at which the search ends
-    enough : distance to the optimum at which it ends [standard errors]
     """
     unknowns = problem.unknowns(effects)
-    found, left, optimum = _search(problem, unknowns, start, start.size, evaluations, precision, enough)
+    found, left, optimum = _search(problem, unknowns, start, start.size, evaluations, precision)
     limits = _bounds(problem, unknowns)
     return FitResult(
         problem.point(found, unknowns).damper,
@@ -145,65 +134,14 @@ def fit(
     )
 
 
-def refit(
-    problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS, enough: float = COMPARED_OFFSET
-) -> FitResult:
+def refit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
     """Fit a damper with the effects that it has, from its present parameters; see `fit`."""
-    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations, enough=enough)
+    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
 
 
 def polished(problem: Problem, fitted: FitResult) -> FitResult:
     """Search a fit on until it is an optimum by its residuals: what is adopted and quoted."""
-    return fit(problem, fitted.effects, fitted.optimum, POLISHED_EVALUATIONS, POLISHED_PRECISION, enough=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class StepWithout:
-    """The Gauss-Newton step from a damper to the optimum of all tests but some, by one linearisation with all.
-
-    Equation: (sum_i J_i' J_i + P' P) d = -sum_i J_i' r_i, i the tests that are kept, P the prior
-                                                        Source: Allen 1974, Technometrics 16, 125-127, by groups
-    """
-
-    start: Array
-    """(p,) the damper in the units of the search."""
-    normal: Mapping[str, Array]
-    """(p, p) J' J of each test, by name."""
-    gradient: Mapping[str, Array]
-    """(p,) J' r of each test."""
-    prior: Array
-    """(p, p) P' P."""
-
-    @classmethod
-    def at(cls, problem: Problem, damper: Damper) -> StepWithout:
-        """Linearise the tests of a problem at a damper."""
-        start = problem.start_with(damper)
-        unknowns = problem.unknowns(tuple(damper.effects))
-        low, high = _bounds(problem, unknowns)
-        here = linearise(problem, unknowns, np.clip(start, low, high), (low, high))
-        names = [o.name for o in problem.observations]
-        ends = np.cumsum([r.size for r in here.residuals])[:-1]
-        slopes, prior = np.split(here.jacobian.dense(), ends), _prior(problem, len(unknowns))
-        return cls(
-            start,
-            {name: each.T @ each for name, each in zip(names, slopes, strict=True)},
-            {name: each.T @ r for name, each, r in zip(names, slopes, here.residuals, strict=True)},
-            prior.T @ prior,
-        )
-
-    def to(self, gone: Collection[str]) -> Array:
-        """Return the (p,) point that the step without some tests goes to; what no kept test shows stays."""
-        kept = [name for name in self.normal if name not in gone]
-        normal = sum((self.normal[name] for name in kept), self.prior)
-        gradient = sum((self.gradient[name] for name in kept), np.zeros(self.start.size))
-        return self.start - newton_step(normal, gradient)
-
-
-def newton_step(normal: Array, gradient: Array) -> Array:
-    """Solve normal equations (p, p) for (p,) values, zero along directions that they do not show."""
-    size = np.sqrt(np.maximum(np.diag(normal), np.finfo(np.float64).tiny))
-    scaled = normal / np.outer(size, size)
-    return np.asarray(np.linalg.lstsq(scaled, gradient / size, rcond=SMALLEST_SINGULAR)[0] / size)
+    return fit(problem, fitted.effects, fitted.optimum, POLISHED_EVALUATIONS, POLISHED_PRECISION)
 
 
 def projected_out(frame: Array, values: Array) -> Array:
@@ -215,19 +153,12 @@ def profiled_misfit(problem: Problem, damper: Damper) -> float:
     """Return the smallest misfit over T0, C and k while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
-    free = 3 * len(problem.base)
-    _, left, _ = _search(problem, unknowns, start, free, MOST_EVALUATIONS, PRECISION, COMPARED_OFFSET)
+    _, left, _ = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS, PRECISION)
     return float(left.stacked @ left.stacked)
 
 
 def _search(
-    problem: Problem,
-    unknowns: Sequence[Unknown],
-    start: Array,
-    free: int,
-    evaluations: int,
-    precision: float,
-    enough: float,
+    problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int, precision: float
 ) -> tuple[Array, Linearisation, Optimum]:
     """Minimise over the first `free` variables; return the (3 b + e,) optimum, linearised there and judged.
 
@@ -254,26 +185,24 @@ def _search(
     def linearised_at(x: bytes) -> Linearisation:
         return linearise(problem, unknowns, all_variables(np.frombuffer(x)), limits)
 
-    @lru_cache(maxsize=2)
-    def triangle_at(x: bytes) -> Array:
-        """Return (p + 1, p + 1) rows with the inner products of all columns of the Jacobian and of the residuals."""
-        at, here = all_variables(np.frombuffer(x)), linearised_at(x)
-        rows, shown = at[: unseen.size], np.ones(at.size)
-        shown[: unseen.size] = rows > unseen
-        slopes = np.concatenate([here.jacobian.dense(active), (prior * shown)[:, active]])
-        away = prior[:, : unseen.size] @ (np.maximum(rows, unseen) - np.maximum(start_of_rows, unseen))
-        return np.asarray(np.linalg.qr(np.column_stack([slopes, np.concatenate([here.stacked, away])]), mode="r"))
+    def residuals_at(x: Array) -> Array:
+        shown, begun = np.maximum(all_variables(x)[: start_of_rows.size], unseen), np.maximum(start_of_rows, unseen)
+        return np.concatenate([linearised_at(x.tobytes()).stacked, prior[:, : start_of_rows.size] @ (shown - begun)])
+
+    def slopes_at(x: Array) -> Array:
+        at = all_variables(x)
+        shown = np.ones(at.size)
+        shown[: unseen.size] = at[: unseen.size] > unseen
+        return np.concatenate([linearised_at(x.tobytes()).jacobian.dense(active), (prior * shown)[:, active]])
 
     found = minimise(
-        lambda x: triangle_at(x.tobytes())[:, -1],
+        residuals_at,
         begin[active],
-        lambda x: triangle_at(x.tobytes())[:, :-1],
+        slopes_at,
         (low[active], high[active]),
         precision=precision,
         evaluations=evaluations,
         largest_offset=POLISHED_OFFSET,
-        size=sum(o.residual_count for o in problem.observations) + len(prior),
-        enough=enough,
     )
     return all_variables(found.x), linearised_at(found.x.tobytes()), found
 
