@@ -69,7 +69,7 @@ class KernelInputs:
         mine, others = self.at_nodes[:, columns], other.at_nodes[:, columns]
         if not same_voltage or differs[K]:
             mine, others = self._interpolated(mine), other._interpolated(others)
-        mine, others = (np.where(columns == K, 1.0 / rows, rows) for rows in (mine, others))
+        mine, others = (np.divide(1.0, rows, out=rows.copy(), where=columns == K) for rows in (mine, others))
         shape = np.broadcast_shapes(mine.shape, others.shape)
         return columns, np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
