@@ -1,4 +1,4 @@
-"""`pzd peers` compares the adopted damper with published models, from a config to the table."""
+"""`pzd peers` compares the adopted damper with published models and a black box, from configs to the table."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from stub_stages import project
 
 from pzd.artefacts import Diagnosed, Identified, Knees, LawRow, Rig
-from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow, PeerSummaryRow
 from pzd.cli.app import status
 from pzd.cli.peers import comparison_lines
 from pzd.damper.model import BaseRow, Damper
@@ -18,7 +18,7 @@ from pzd.diagnosis.peer_comparison import compare_with_peers
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 
-MODELS = ["plain", "handed_on", "bouc_wen", "kwok"]
+MODELS = ["plain", "handed_on", "bouc_wen", "kwok", "narx"]
 CONFIG = """\
 seed: 1
 rig:
@@ -45,6 +45,20 @@ def row(model: str, W_s: float, R2: float | None, record: str | None = "r01", vo
     return PeerRow(setting=None, voltage_V=voltage, kept_back="test", record=record, model=model, W_s=W_s, R2=R2)
 
 
+def summary(model: str, parameters: int, W_s: float, left_out: float | None) -> PeerSummaryRow:
+    return PeerSummaryRow(
+        setting=None,
+        model=model,
+        parameters=parameters,
+        tests=6,
+        W_s=W_s,
+        R2=1.0 - W_s,
+        left_out=0 if left_out is None else 1,
+        W_s_left_out=left_out,
+        R2_left_out=None if left_out is None else 1.0 - left_out,
+    )
+
+
 def test_the_table_has_one_line_per_test_and_one_column_per_model() -> None:
     rows = [row("plain", 0.0201, 0.9771), row("kwok", 0.01, 0.99454), row("plain", 0.02, 0.98, None, None)]
     rows += [row("kwok", 0.03, None, None, None)]
@@ -62,24 +76,31 @@ def test_the_table_has_one_line_per_test_and_one_column_per_model() -> None:
         )
         for name, value, unit in (("c", 1500.0, "N s/m"), ("delta", 0.6, "-"))
     ]
-    found = PeerComparison(("plain", "kwok"), tuple(rows), tuple(parameters), ("ramp",))
+    many = [
+        parameters[0].model_copy(update={"model": "narx", "form": "n = 1", "parameter": f"a{j}"}) for j in range(13)
+    ]
+    together = summary("plain", 9, 0.02, 0.0201), summary("kwok", 18, 0.03, None)
+    found = PeerComparison(("plain", "kwok"), tuple(rows), together, (*parameters, *many), ("ramp",), ("r01",))
     assert list(comparison_lines(found, Control("current", "A"))) == [
         "tests kept back:",
         "  current [A]  test  W_s plain  W_s kwok  R2 plain  R2 kwok",
         "  0.5          r01   0.0201     0.01      0.9771    0.9945",
-        "",
-        "all tests kept back:",
-        "  W_s plain  W_s kwok  R2 plain  R2 kwok",
-        "  0.02       0.03      0.9800    -",
         "",
         "left out, predicted from its neighbours:",
         "  current [A]  W_s plain  W_s kwok  R2 plain  R2 kwok",
         "  0.5          0.0201     0.01      0.9771    0.9945",
         "",
         "peers, fitted to all tests:",
-        "  current [A]  model  parameters                   fit",
-        "  0.5          kwok   c = 1500 N s/m, delta = 0.6  converged",
+        "  current [A]  model        parameters                   fit",
+        "  0.5          kwok         c = 1500 N s/m, delta = 0.6  converged",
+        "  0.5          narx, n = 1  13 coefficients              converged",
+        "",
+        "all tests kept back, and all that is left out:",
+        "  model  parameters  tests  W_s   R2      left out  W_s left out  R2 left out",
+        "  plain  9           6      0.02  0.9800  1         0.0201        0.9799",
+        "  kwok   18          6      0.03  0.9700  0         -             -",
         "not compared, for the control signal moves: ramp",
+        "narx is unstable in free run, its force was held at a bound: r01",
     ]
 
 
@@ -126,10 +147,49 @@ def test_from_a_config_to_the_table(tmp_path: Path, capsys: pytest.CaptureFixtur
     by_test = {(each["record"], each["model"]): each for each in told["rows"] if each["record"]}
     for each in prediction["by"]:
         assert by_test[each["record"], "handed_on"]["R2"] == pytest.approx(each["R2"], rel=1e-9)
+    together = {each["model"]: each for each in told["summary"]}
+    assert {model: each["W_s"] for model, each in together.items()} == {m: each["W_s"] for m, each in whole.items()}
+    assert [together[model]["parameters"] for model in MODELS[:-1]] == [
+        9,
+        10,
+        18,
+        18,
+    ]  # three numbers and F_0; six each
+    assert together["narx"]["parameters"] == sum(each["model"] == "narx" for each in told["parameters"])
     left_out = [each for each in told["rows"] if each["kept_back"] == "voltage"]
+    assert {each["W_s"] for each in left_out} == {each["W_s_left_out"] for each in told["summary"]}
     assert {each["voltage_V"] for each in left_out} == {1.0}
     assert min(left_out, key=lambda each: each["W_s"])["model"] == "handed_on"
     assert status(["peers", str(config), *runs]) == 0
     printed = capsys.readouterr().out
     assert "diagnose   fresh" in printed
     assert "bouc_wen, n = " in printed
+    another = tmp_path / "another.yaml"
+    another.write_text(CONFIG.replace("seed: 1", "seed: 2"), encoding="utf-8")
+    assert status(["peers", str(config), str(another), *runs]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    head = lines.index("all tests kept back, and all that is left out:")
+    named = [line.split()[:3] for line in lines[head + 2 : head + 2 + 2 * len(MODELS)]]
+    assert [line[:2] for line in named] == [[damper, model] for damper in ("small", "another") for model in MODELS]
+    assert named[: len(MODELS)] == [["small", model, str(together[model]["parameters"])] for model in MODELS]
+    assert status(["peers", str(config), str(another), *runs, "--json"]) == 0
+    both = json.loads(capsys.readouterr().out)
+    assert both["dampers"]["small"] == {key: value for key, value in told.items() if key != "not_to_be_trusted"}
+    assert [each["model"] for each in both["dampers"]["another"]["summary"]] == MODELS
+
+
+def test_every_config_is_read_before_the_first_one_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, runs = project(tmp_path, monkeypatch), tmp_path / "runs"
+    other = tmp_path / "elsewhere" / config.name
+    other.parent.mkdir()
+    other.write_bytes(config.read_bytes())
+    for more, says in (
+        (config, "give each config once"),
+        (other, "rename one of them"),
+        (tmp_path / "no.yaml", "no.yaml"),
+    ):
+        assert status(["peers", str(config), str(more), "--runs", str(runs)]) == 2
+        assert says in capsys.readouterr().err
+    assert not runs.exists()

@@ -321,8 +321,27 @@ class PeerRow(Frozen):
     """1 - (sum of squared residuals)/(sum of squares about the mean force of each test); None where no force moves."""
 
 
+class PeerSummaryRow(Frozen):
+    """One model on one damper: how many numbers it takes, and how well they predict."""
+
+    setting: str | None
+    model: str
+    parameters: int = Field(ge=0)
+    """Numbers that were fitted, over all voltages."""
+    tests: int = Field(ge=0)
+    """Held-out tests."""
+    W_s: float | None = Field(ge=0.0)
+    """Criterion (4) of all held-out tests together."""
+    R2: float | None = Field(le=1.0)
+    left_out: int = Field(ge=0)
+    """Voltages that were left out, each between two others."""
+    W_s_left_out: float | None = Field(ge=0.0)
+    """Criterion (4) of the tests at all of these together, each predicted from the other voltages."""
+    R2_left_out: float | None = Field(le=1.0)
+
+
 class PeerParameterRow(Frozen):
-    """One parameter of one published model at one voltage, fitted to all tests of it."""
+    """One parameter of one model that diagnose does not fit, at one voltage or over all, fitted to all tests of it."""
 
     setting: str | None
     voltage_V: float | None
@@ -345,13 +364,21 @@ class PeerComparison:
     models: tuple[str, ...]
     """In the order of the tables."""
     rows: tuple[PeerRow, ...]
+    summary: tuple[PeerSummaryRow, ...]
+    """One row per model."""
     parameters: tuple[PeerParameterRow, ...]
     moving: tuple[str, ...]
     """Records whose control signal moves: peers are fitted and compared where it stands still."""
+    unstable: tuple[str, ...] = ()
+    """Held-out tests that an unstable black box predicted; where it diverged, it was held at a bound."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write peers.csv and parameters.csv."""
-        files: Files = {"rows": ("peers.csv", PeerRow), "parameters": ("parameters.csv", PeerParameterRow)}
+        """Write peers.csv, summary.csv and parameters.csv."""
+        files: Files = {
+            "rows": ("peers.csv", PeerRow),
+            "summary": ("summary.csv", PeerSummaryRow),
+            "parameters": ("parameters.csv", PeerParameterRow),
+        }
         write_files(self, files, folder, control)
 
 

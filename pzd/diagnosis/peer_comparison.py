@@ -1,19 +1,24 @@
-"""Comparison of the adopted damper with the baseline and with published models, on held-out tests and voltages."""
+"""Comparison of the adopted damper with the baseline and other models, on held-out tests and voltages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, HeldOutTest, Identified, Prediction, Rig, base_of
-from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts import Diagnosed, HeldOutTest, Identified, Rig, base_of
+from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParameterRow, PeerRow, PeerSummaryRow
+from pzd.damper.effect import NODE_VOLTAGES
+from pzd.damper.model import Damper
+from pzd.diagnosis import narx
 from pzd.diagnosis.cross_validation import Folds, PredictionError, assign_folds, squared_sums
 from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
 from pzd.diagnosis.fit.prediction import comparable_samples
-from pzd.diagnosis.peers import Peer, PeerForm, ShapeParameter, StrokeMotion, peers
+from pzd.diagnosis.narx import Order
+from pzd.diagnosis.peers import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion, peers
 from pzd.fit.least_squares import minimise, minimise_from
 from pzd.record import Array, Mask
 from pzd.schema.errors import ConfigError, DataError
@@ -127,6 +132,12 @@ def _value(parameter: ShapeParameter, searched: float) -> float:
 # held-out test.
 
 
+Predictor = Callable[[int, int], Array]
+"""Gives the force (n,) of a fitted model [N] on a record of a group, both by number."""
+Fitter = Callable[[int | None, Sequence[int]], Predictor]
+"""Fits a model to the tests of some groups, less a fold or none of them."""
+
+
 @dataclass(frozen=True, eq=False)
 class HeldOutTests:
     """The tests of one setting at constant voltage, in the folds of the cross-validation."""
@@ -174,18 +185,33 @@ class HeldOutTests:
         form = min(fits, key=lambda form: sum(fit.error for fit in fits[form].values()))
         return form, fits[form]
 
-    def held_out_error(self, peer: Peer) -> PredictionError:
-        """Compute the held-out prediction error of a peer, refitted without each fold."""
+    def law(self, peer: Peer) -> Fitter:
+        """Return how a peer is fitted: at each voltage by itself, its parameters interpolated in between."""
+
+        def fitter(fold: int | None, groups: Sequence[int]) -> Predictor:
+            form, fits = self.best_form(peer, self.folds.no_samples if fold is None else self.folds.folds[fold], groups)
+
+            def predictor(group: int, i: int) -> Array:
+                parameters = between_voltages(fits, self.groups[group][0])
+                return peer.force(form, StrokeMotion.of(self.prepared[i]), parameters)
+
+            return predictor
+
+        return fitter
+
+    def held_out_error(self, fitter: Fitter) -> PredictionError:
+        """Compute the held-out prediction error of a model, refitted without each fold."""
+        every = range(len(self.groups))
         found = []
-        for fold in self.folds.folds:
-            form, fits = self.best_form(peer, fold, range(len(self.groups)))
-            found += [self._predicted_error(peer, form, fits, group, fold) for group in range(len(self.groups))]
+        for number, fold in enumerate(self.folds.folds):
+            predictor = fitter(number, every)
+            found += [self._predicted_error(predictor, group, fold) for group in every]
         return PredictionError.concatenated(found)
 
-    def interpolation_error(self, peer: Peer, group: int) -> PredictionError:
-        """Compute the prediction error at a voltage, with parameters interpolated between the other voltages."""
-        form, fits = self.best_form(peer, self.folds.no_samples, (g for g in range(len(self.groups)) if g != group))
-        return self._predicted_error(peer, form, fits, group, self.all_samples)
+    def interpolation_error(self, fitter: Fitter, group: int) -> PredictionError:
+        """Compute the prediction error at a voltage of a model that was fitted to the others."""
+        predictor = fitter(None, [g for g in range(len(self.groups)) if g != group])
+        return self._predicted_error(predictor, group, self.all_samples)
 
     def known_error(self, figures: Mapping[int, float]) -> PredictionError:
         """Return the held-out error of a model whose W_s of each record is known."""
@@ -196,17 +222,13 @@ class HeldOutTests:
         return self._known_error(self.all_samples, dict.fromkeys(self.groups[group][1], figure))
 
     def _known_error(self, held_out: Sequence[Mask], figures: Mapping[int, float]) -> PredictionError:
-        bare = self._error(held_out, figures, lambda i: np.zeros(held_out[i].size))
+        bare = self.error(held_out, figures, lambda i: np.zeros(held_out[i].size))
         return replace(bare, error=np.array([figures[i] for i in bare.records]) * bare.energy)
 
-    def _predicted_error(
-        self, peer: Peer, form: PeerForm, fits: Mapping[float, PeerFit], group: int, held_out: Sequence[Mask]
-    ) -> PredictionError:
-        voltage, members = self.groups[group]
-        parameters = between_voltages(fits, voltage)
-        return self._error(held_out, members, lambda i: peer.force(form, StrokeMotion.of(self.prepared[i]), parameters))
+    def _predicted_error(self, predictor: Predictor, group: int, held_out: Sequence[Mask]) -> PredictionError:
+        return self.error(held_out, self.groups[group][1], lambda i: predictor(group, i))
 
-    def _error(
+    def error(
         self, held_out: Sequence[Mask], members: Iterable[int], predicted: Callable[[int], Array]
     ) -> PredictionError:
         """Compute the error of predicted forces (n,) on the held-out samples of some records."""
@@ -218,6 +240,101 @@ class HeldOutTests:
                 records.append(i)
                 entries.append((*squared_sums(force, force - predicted(i)[kept]), 0.0))
         return PredictionError.of_entries(records, entries)
+
+
+# --- The black box: its order is chosen by tests that were fitted
+
+
+UNSTABLE = "unstable in free run"
+"""Status of a fit of which the free run grows without end."""
+
+
+@dataclass(frozen=True, eq=False)
+class BlackBox:
+    """The NARX models of some tests: fitted at each voltage by itself, of one order, chosen by cross-validation."""
+
+    tests: HeldOutTests
+    unstable: set[str] = field(default_factory=set)
+    """Names of the held-out tests that an unstable model predicted."""
+    _factors: dict[tuple[Order, int, int], Array] = field(default_factory=dict, repr=False)
+    """Triangular factors by order, group and fold."""
+    _fits: dict[tuple[Order, int, tuple[int, ...]], PeerFit] = field(default_factory=dict, repr=False)
+    """Fits by order, group and folds: of all folds but two, either is predicted."""
+
+    def __call__(self, fold: int | None, groups: Sequence[int]) -> Predictor:
+        """Fit the model of the best order to the tests of some groups, less a fold; see `Fitter`."""
+        order, fits = self.best_order(fold, groups)
+        nodes = sorted(fits)
+
+        def predictor(group: int, i: int) -> Array:
+            weights = (np.interp(self.tests.groups[group][0], nodes, one) for one in np.eye(len(nodes)))
+            force = np.zeros(self.tests.prepared[i].record.time.size)
+            for node, weight in zip(nodes, weights, strict=True):
+                if weight > 0.0:
+                    force += weight * self._free_run(order, fits[node].parameters, i)
+                    if fits[node].status == UNSTABLE:
+                        self.unstable.add(self.tests.prepared[i].record.name)
+            return force
+
+        return predictor
+
+    def best_order(self, fold: int | None, groups: Sequence[int]) -> tuple[Order, dict[float, PeerFit]]:
+        """Return the order that predicts the tests of some groups best, less a fold, and its fits by voltage [V].
+
+        Each of the other folds is predicted in free run by a fit without it: the fold itself has no part in the choice.
+        """
+        folds = tuple(k for k in range(len(self.tests.folds.folds)) if k != fold)
+        order = min(self._orders, key=lambda order: self._error_within(order, folds, groups))
+        return order, {self.tests.groups[group][0]: self._fit(order, group, folds) for group in groups}
+
+    @cached_property
+    def _orders(self) -> list[Order]:
+        members = [i for _, group in self.tests.groups for i in group]
+        return narx.orders([StrokeMotion.of(self.tests.prepared[i]) for i in members])
+
+    @cached_property
+    def _bound(self) -> float:
+        forces = (self.tests.prepared[i].record.force for _, group in self.tests.groups for i in group)
+        return narx.BOUND * max(float(np.max(np.abs(force))) for force in forces)
+
+    def _error_within(self, order: Order, folds: tuple[int, ...], groups: Sequence[int]) -> float:
+        """Compute W_s on each fold by fits to the others; where there is one alone, by a fit to itself."""
+        found = []
+        for fold in folds:
+            others = tuple(k for k in folds if k != fold) or folds
+            for group in groups:
+                coefficients = self._fit(order, group, others).parameters
+                found.append(
+                    self.tests.error(
+                        self.tests.folds.folds[fold],
+                        self.tests.groups[group][1],
+                        partial(self._free_run, order, coefficients),
+                    )
+                )
+        return PredictionError.concatenated(found).criterion or 0.0
+
+    def _free_run(self, order: Order, coefficients: Array, i: int) -> Array:
+        p = self.tests.prepared[i]
+        return narx.free_run(order, coefficients, StrokeMotion.of(p), float(p.record.force[0]), self._bound)
+
+    def _fit(self, order: Order, group: int, folds: tuple[int, ...]) -> PeerFit:
+        key = order, group, folds
+        if key not in self._fits:
+            coefficients, error = narx.fit(narx.joined(self._factor(order, group, fold) for fold in folds))
+            status = "stable" if narx.is_stable(order, coefficients) else UNSTABLE
+            self._fits[key] = PeerFit(coefficients, error, status)
+        return self._fits[key]
+
+    def _factor(self, order: Order, group: int, fold: int) -> Array:
+        key = order, group, fold
+        if key not in self._factors:
+            factors = []
+            for i in self.tests.groups[group][1]:
+                p = self.tests.prepared[i]
+                fitted = self.tests.folds.folds[fold][i] & comparable_samples(p)
+                factors.append(narx.triangle(order, StrokeMotion.of(p), p.record.force, fitted))
+            self._factors[key] = narx.joined(factors)
+        return self._factors[key]
 
 
 # --- The comparison as tables
@@ -249,75 +366,140 @@ def compare_with_peers(rig: Rig, identified: Identified, diagnosed: Diagnosed, s
         )
     prepared = prepare(unsaturated_records(rig, setting)[0])
     tests = HeldOutTests(prepared, assign_folds(prepared, base_of(identified.rows, setting)))
-    return _comparison(tests, prediction, setting, controlled=controlled)
+    black_box = BlackBox(tests)
+    fitters: dict[str, Fitter] = {**{name: tests.law(peer) for name, peer in peers().items()}, narx.NAME: black_box}
+    by_record = _by_record(tests, prediction.by)
+    held_out = {
+        BASELINE: tests.known_error({i: each.W_s_plain for i, each in by_record.items()}),
+        ADOPTED: tests.known_error({i: each.W_s for i, each in by_record.items()}),
+        **{name: tests.held_out_error(fitter).of_records(tuple(by_record)) for name, fitter in fitters.items()},
+    }
+    left_out = {}
+    known = {each.voltage: each for each in prediction.left_out_voltages}
+    for group, (voltage, _) in enumerate(tests.groups):
+        if voltage in known:
+            left_out[voltage] = {
+                BASELINE: tests.known_interpolation_error(group, known[voltage].W_s_plain),
+                ADOPTED: tests.known_interpolation_error(group, known[voltage].W_s),
+                **{name: tests.interpolation_error(fitter, group) for name, fitter in fitters.items()},
+            }
+    parameters = tuple(_parameter_rows(tests, black_box, setting, controlled=controlled))
+    counts = {
+        BASELINE: _count(diagnosed.baseline),
+        ADOPTED: _count(diagnosed.damper),
+        **{name: sum(row.model == name for row in parameters) for name in fitters},
+    }
+    return PeerComparison(
+        tuple(held_out),
+        tuple(_rows(tests, held_out, left_out, setting, controlled=controlled)),
+        tuple(_summary_row(model, setting, counts[model], held_out, left_out) for model in held_out),
+        parameters,
+        tuple(tests.moving),
+        tuple(sorted(black_box.unstable)),
+    )
 
 
-def _comparison(
-    tests: HeldOutTests, prediction: Prediction, setting: str | None, *, controlled: bool
-) -> PeerComparison:
-    """Compare test by test, by voltage, in total, and at left-out voltages."""
-    rows: list[PeerRow] = []
+def _rows(
+    tests: HeldOutTests,
+    held_out: Mapping[str, PredictionError],
+    left_out: Mapping[float, Mapping[str, PredictionError]],
+    setting: str | None,
+    *,
+    controlled: bool,
+) -> Iterator[PeerRow]:
+    """Yield the errors test by test, by voltage, in total, and at left-out voltages."""
 
-    def add(
+    def rows(
         kept_back: Literal["test", "voltage"],
         voltage: float | None,
         record: str | None,
         errors: Mapping[str, PredictionError],
-    ) -> None:
-        """Add one row per model that predicts anything."""
+    ) -> Iterator[PeerRow]:
+        """Yield one row per model that predicts anything."""
         for model, each in errors.items():
             if each.criterion is not None:
-                rows.append(
-                    PeerRow(
-                        setting=setting,
-                        voltage_V=voltage if controlled else None,
-                        kept_back=kept_back,
-                        record=record,
-                        model=model,
-                        W_s=each.criterion,
-                        R2=each.determination,
-                    )
+                yield PeerRow(
+                    setting=setting,
+                    voltage_V=voltage if controlled else None,
+                    kept_back=kept_back,
+                    record=record,
+                    model=model,
+                    W_s=each.criterion,
+                    R2=each.determination,
                 )
 
-    by_record = _by_record(tests, prediction.by)
-    errors = {
-        BASELINE: tests.known_error({i: each.W_s_plain for i, each in by_record.items()}),
-        ADOPTED: tests.known_error({i: each.W_s for i, each in by_record.items()}),
-        **{name: tests.held_out_error(peer).of_records(tuple(by_record)) for name, peer in peers().items()},
-    }
     for voltage, group in tests.groups:
         for i in group:
-            name = tests.prepared[i].record.name
-            add("test", voltage, name, {model: each.of_records([i]) for model, each in errors.items()})
+            errors = {model: each.of_records([i]) for model, each in held_out.items()}
+            yield from rows("test", voltage, tests.prepared[i].record.name, errors)
     for voltage, group in tests.groups if controlled else ():
-        add("test", voltage, None, {model: each.of_records(group) for model, each in errors.items()})
-    add("test", None, None, errors)
-    left_out = {left.voltage: left for left in prediction.left_out_voltages}
-    for number, (voltage, _) in enumerate(tests.groups):
-        if voltage in left_out:
-            between = {
-                BASELINE: tests.known_interpolation_error(number, left_out[voltage].W_s_plain),
-                ADOPTED: tests.known_interpolation_error(number, left_out[voltage].W_s),
-                **{name: tests.interpolation_error(peer, number) for name, peer in peers().items()},
-            }
-            add("voltage", voltage, None, between)
-    parameters = [
-        PeerParameterRow(
-            setting=setting,
-            voltage_V=voltage if controlled else None,
-            model=peer.name,
-            form=form.label,
-            parameter=parameter.name,
-            value=float(value),
-            unit=parameter.unit,
-            status=fit.status,
-        )
-        for peer in peers().values()
-        for form, fits in [tests.best_form(peer, tests.folds.no_samples, range(len(tests.groups)))]
-        for voltage, fit in fits.items()
-        for parameter, value in zip(peer.parameters, fit.parameters, strict=True)
-    ]
-    return PeerComparison(tuple(errors), tuple(rows), tuple(parameters), tuple(tests.moving))
+        yield from rows("test", voltage, None, {model: each.of_records(group) for model, each in held_out.items()})
+    yield from rows("test", None, None, held_out)
+    for voltage, errors_there in left_out.items():
+        yield from rows("voltage", voltage, None, errors_there)
+
+
+def _summary_row(
+    model: str,
+    setting: str | None,
+    count: int,
+    held_out: Mapping[str, PredictionError],
+    left_out: Mapping[float, Mapping[str, PredictionError]],
+) -> PeerSummaryRow:
+    error = held_out[model]
+    between = PredictionError.concatenated([errors[model] for errors in left_out.values()])
+    return PeerSummaryRow(
+        setting=setting,
+        model=model,
+        parameters=count,
+        tests=len(set(error.records)),
+        W_s=error.criterion,
+        R2=error.determination,
+        left_out=len(left_out),
+        W_s_left_out=between.criterion,
+        R2_left_out=between.determination,
+    )
+
+
+def _parameter_rows(
+    tests: HeldOutTests, black_box: BlackBox, setting: str | None, *, controlled: bool
+) -> Iterator[PeerParameterRow]:
+    """Yield the parameters of every model that was fitted here to all tests."""
+    every = range(len(tests.groups))
+    for peer in peers().values():
+        form, fits = tests.best_form(peer, tests.folds.no_samples, every)
+        yield from _of_model(peer.name, form.label, peer.parameters, fits, setting, controlled=controlled)
+    order, fits = black_box.best_order(None, every)
+    yield from _of_model(narx.NAME, order.label, order.coefficients, fits, setting, controlled=controlled)
+
+
+def _of_model(
+    model: str,
+    form: str,
+    parameters: Sequence[Coefficient | ShapeParameter],
+    fits: Mapping[float, PeerFit],
+    setting: str | None,
+    *,
+    controlled: bool,
+) -> Iterator[PeerParameterRow]:
+    for voltage, fit in fits.items():
+        for parameter, value in zip(parameters, fit.parameters, strict=True):
+            yield PeerParameterRow(
+                setting=setting,
+                voltage_V=voltage if controlled else None,
+                model=model,
+                form=form,
+                parameter=parameter.name,
+                value=float(value),
+                unit=parameter.unit,
+                status=fit.status,
+            )
+
+
+def _count(damper: Damper) -> int:
+    """Return how many numbers a damper has: T0, C and k of each condition, and the parameters of its effects."""
+    effects = (v for values in damper.effects.values() for name, v in values.items() if name != NODE_VOLTAGES)
+    return 3 * len(damper.base) + sum(len(value) if isinstance(value, tuple) else 1 for value in effects)
 
 
 def _by_record(tests: HeldOutTests, by: Sequence[HeldOutTest]) -> dict[int, HeldOutTest]:

@@ -18,7 +18,7 @@ from pzd.artefacts import (
 )
 from pzd.artefacts.changes import Course, CourseRow
 from pzd.artefacts.csv_rows import Estimate
-from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow
+from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerSummaryRow
 from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
 from pzd.artefacts.knee import DIRECTIONS
 from pzd.artefacts.rig import slowest_test_force
@@ -340,7 +340,6 @@ def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
     parts = {
         "tests kept back": [row for row in held_out if row.record is not None],
         f"tests kept back, by {control.name}": [row for row in pooled if row.voltage_V is not None],
-        "all tests kept back": [row for row in pooled if row.voltage_V is None],
         "left out, predicted from its neighbours": [row for row in found.rows if row.kept_back == "voltage"],
     }
     columns = (
@@ -355,6 +354,36 @@ def peers(found: PeerComparison, control: Control) -> Iterator[Table]:
             tests = [{row.model: row for row in rows[first : first + count]} for first in range(0, len(rows), count)]
             yield Table(title, columns, tests)
     yield _peer_parameters(found.parameters, control)
+    yield peer_summary([("", row) for row in found.summary])
+
+
+def peer_summary(rows: Sequence[tuple[str, PeerSummaryRow]]) -> Table:
+    """Return how well each model predicts each damper, with the numbers that it takes.
+
+    Parameters
+    ----------
+    rows : each with the name of the damper, empty where there is one
+    """
+
+    def column(name: str, head: str, *, optional: bool = False, decimals: int | None = None) -> Column:
+        return Column(name, head, value=lambda named: getattr(named[1], name), optional=optional, decimals=decimals)
+
+    return Table(
+        "all tests kept back, and all that is left out",
+        (
+            Column("config", "damper", value=lambda named: named[0], optional=True),
+            column("setting", "setting", optional=True),
+            column("model", "model"),
+            column("parameters", "parameters"),
+            column("tests", "tests"),
+            column("W_s", "W_s"),
+            column("R2", "R2", decimals=4),
+            column("left_out", "left out"),
+            column("W_s_left_out", "W_s left out"),
+            column("R2_left_out", "R2 left out", decimals=4),
+        ),
+        rows,
+    )
 
 
 # --- changes: each quantity over the states
@@ -401,11 +430,17 @@ def _of_model(name: str, model: str, decimals: int | None = None) -> Column:
     )
 
 
+MOST_ASSIGNMENTS = 12
+"""Parameters of a model up to which a line of a terminal shows them all."""
+
+
 def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Table:
     """Return the parameters of published models, a line for each model and control value."""
 
-    def assignment(row: PeerParameterRow) -> str:
-        return f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}"
+    def assignments(fit: Sequence[PeerParameterRow]) -> str:
+        if len(fit) > MOST_ASSIGNMENTS:
+            return f"{len(fit)} coefficients"
+        return ", ".join(f"{row.parameter} = {TERMINAL.amount(row.value, row.unit)}" for row in fit)
 
     fits: dict[tuple[Any, ...], list[PeerParameterRow]] = {}
     for row in rows:
@@ -415,7 +450,7 @@ def _peer_parameters(rows: Sequence[PeerParameterRow], control: Control) -> Tabl
         (
             *conditions(control, lambda fit: fit[0])[:2],
             Column("model", "model", value=lambda fit: ", ".join(filter(None, (fit[0].model, fit[0].form)))),
-            Column("parameters", "parameters", value=lambda fit: ", ".join(map(assignment, fit))),
+            Column("parameters", "parameters", value=assignments),
             Column("status", "fit", value=lambda fit: fit[0].status),
         ),
         list(fits.values()),

@@ -156,7 +156,7 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
     low, high = np.array(TRUE["bouc_wen"]), np.array([3000.0, 500.0, 900.0, 30.0, 600.0, 2.0])
     at = {U: low + U / 100.0 * (high - low) for U in THREE}
     tests = kept_back_tests(peer_records(BOUC_WEN.forms[1], at, rng), THREE)
-    left_out = tests.interpolation_error(BOUC_WEN, 1)
+    left_out = tests.interpolation_error(tests.law(BOUC_WEN), 1)
     form, _ = tests.best_form(BOUC_WEN, tests.folds.no_samples, range(3))
     assert form.label == "n = 2"
     assert left_out.records == tests.groups[1][1]
