@@ -67,11 +67,23 @@ def written(folder: Path) -> dict[str, int]:
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
+def named_in(command: str) -> list[Path]:
+    """The configs that a command is given."""
+    return [ROOT / word for word in command.split() if word.startswith("configs/") and word.endswith(".yaml")]
+
+
 def shown_of(config: Path) -> list[tuple[str, str]]:
-    """Each command that a page shows with this config, and what the page says it prints, in whole or in part."""
+    """Each command that a page shows with this config, and what the page says it prints, in whole or in part.
+
+    A command on several configs is one of the last of them, and of none where data of another are absent.
+    """
     pages = [*ROOT.glob("*.md"), *ROOT.glob("configs/*.md"), *ROOT.glob("pzd/**/*.md")]
     found = [listing for path in sorted(pages) for listing in listings(path.read_text(encoding="utf-8"))]
-    return [(command, shown) for command, shown in found if f"configs/{config.name}" in command.split()]
+    return [
+        (command, shown)
+        for command, shown in found
+        if named_in(command)[-1:] == [config] and not any(absent(other) for other in named_in(command))
+    ]
 
 
 def test_there_are_configs_to_run() -> None:
@@ -102,5 +114,6 @@ def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command,
 
     for command, shown in shown_of(config):
         told = pzd(*shlex.split(command)[1:], "--runs", tmp_path)
-        assert told.returncode == first.returncode, told.stdout + told.stderr
+        as_first = {first.returncode} if named_in(command) == [config] else admitted
+        assert told.returncode in as_first, told.stdout + told.stderr
         assert missing(shown, told.stdout, BETWEEN_PROCESSORS) == []
