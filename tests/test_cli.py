@@ -778,8 +778,9 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
 
 
 def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
-    """The effect that closes most comes first; one that is open is not listed."""
+    """The effect that closes most comes first; one that is open, or closes nothing, is not listed."""
     shares = {"gas_spring": (0.09, "likely"), "rounded_yield": (0.61, "certain"), "lash": (0.3, "open")}
+    shares["sensor_delay"] = 0.004, "certain"
     support = {
         name: Support.model_validate(
             {"share": share, "folds_better": 5, "folds": 5, "replaced_by": None, "confidence": 0.95, "sure": sure}

@@ -30,6 +30,8 @@ _MOST = 3
 """How many regions and candidates are listed."""
 _MOST_SHAPES = 2
 """How many shapes of the residual force, each by itself."""
+_LEAST_SHARE = 0.01
+"""Share of the gap from which an effect stands in the headline: in whole percent less is nothing."""
 
 
 def _number(value: float | None, unit: str = "") -> str:
@@ -76,7 +78,7 @@ def headline(diagnosis: Diagnosis) -> str:
     known = [
         f"{name.replace('_', ' ')} is {each.sure} ({each.share:.0%} of the gap comes back without it)"
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
-        if each.sure != "open"
+        if each.sure != "open" and each.share >= _LEAST_SHARE
     ]
     if diagnosis.verdict != "unexplained" or not known or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
