@@ -9,9 +9,7 @@ import numpy as np
 from pzd.record import Array
 
 _last_clock: list[tuple[ref[Array], float]] = []
-_last_channel: list[tuple[ref[Array], float]] = []
-"""The last clock and its step, the last channel and its resolution: records are worked on one at a time, and medians
-and sorting are dear. Arrays of a record are never modified."""
+"""The last clock and its step: records are worked on one at a time, and a median is dear. Clocks are never modified."""
 
 
 def usual_step(time: Array) -> float:
@@ -85,15 +83,10 @@ WHOLE_STEPS = 0.05
 
 def resolution(values: Array) -> float:
     """Return the step in whole numbers of which a channel (n,) is recorded, in its unit; 0 where it has none."""
-    for known, step in _last_channel:
-        if known() is values:
-            return step
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-9 * np.ptp(values)]  # less is rounding
     whole = steps / np.min(steps, initial=np.inf)
-    found = float(np.min(steps)) if steps.size and np.median(np.abs(whole - np.round(whole))) < WHOLE_STEPS else 0.0
-    _last_channel[:] = [(ref(values), found)]
-    return found
+    return float(np.min(steps)) if steps.size and np.median(np.abs(whole - np.round(whole))) < WHOLE_STEPS else 0.0
 
 
 REVERSAL_SHARE = 0.1

@@ -8,6 +8,7 @@ from numpy.random import Generator
 
 from pzd.signals.average_cycle import AverageCycle, variance_by_steps
 from pzd.signals.cycles import Cycles
+from pzd.signals.measures import resolution
 
 
 @pytest.mark.parametrize("points", [2000, 400, 80])
@@ -44,3 +45,11 @@ def test_steps_that_each_cycle_meets_alike_are_no_motion(samples: int) -> None:
     seen = 0.02 * np.round(x / 0.02)
     average = AverageCycle.of(time, seen, Cycles(1.0, 0.0, 8))
     assert np.max(np.abs(average.motion(average.clear_harmonics)(time)[1] - v)) < 1e-3 * np.max(v)
+
+
+def test_the_step_of_a_channel_is_that_of_its_values_now() -> None:
+    """A user who converts units in place has another channel in the same array."""
+    values = np.round(20.0 * np.sin(np.linspace(0.0, 9.0, 500)))
+    assert resolution(values) == pytest.approx(1.0)
+    values *= 1e-3
+    assert resolution(values) == pytest.approx(1e-3)

@@ -143,8 +143,7 @@ def diagnoses(folder: Path) -> Iterator[Row]:
     for name, target in CAMPAIGNS.items():
         told = measured(name)
         whole = float(told["cpu_seconds"]) if name == "clean" else whole
-        shares = ", ".join(f"{part} {share:.0%}" for part, share in told["shares"].items())
-        about = f"{told['cpu_seconds']:.3g} CPU-s; {shares}; {told['verdict']} {' '.join(told['effects'])}"
+        about = f"{told['cpu_seconds']:.3g} CPU-s; {told['verdict']} {' '.join(told['effects'])}"
         yield Row(f"diagnose, {name}", told["seconds"], "s", target, at_least=False, about=about)
         yield Row("  peak memory", told["peak_memory_MB"], "MB", MEMORY_MB, at_least=False,
                   about=f"{told['memory_before_MB']:.0f} MB before it began")  # fmt: skip

@@ -271,12 +271,6 @@ class WeightedRecord:
             self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0
         )
 
-    @property
-    def residual_count(self) -> int:
-        """Number of residuals w."""
-        averaged = not isinstance(self.noise, Autoregression)
-        return 2 * self.weights.size - 1 if averaged else int(np.count_nonzero(self._unbroken))
-
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
             return self.noise.whitened(values)[self._unbroken]
