@@ -101,6 +101,8 @@ class Scored(Frozen):
     """The same of the truth itself, with the mean gain of the tests that were fitted."""
     next_test: bool
     """Whether a next test was proposed."""
+    told_apart: bool = True
+    """False where nothing was hidden, and the true likelihood does not tell nothing from the rivals that are named."""
     seconds: float
     diagnose_seconds: float
     peak_memory_MB: float

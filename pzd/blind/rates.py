@@ -117,7 +117,21 @@ def rightly_outside(case: Scored) -> bool:
 
 def false_name(case: Scored) -> bool:
     """Return whether an effect is named or adopted, of a case that hides none."""
-    return case.failure is not None or case.verdict in ("named", "ambiguous")
+    return case.failure is not None or case.verdict == "named" or (case.verdict == "ambiguous" and bool(case.effects))
+
+
+def says_none(case: Scored) -> bool:
+    """Return whether nothing is said to be missing, or an answer is left open that the true likelihood cannot give."""
+    return case.verdict == "none" or (_nothing_adopted(case) and not case.told_apart)
+
+
+def left_open(case: Scored) -> bool:
+    """Return whether it is left open if something is missing, though the true likelihood can tell."""
+    return _nothing_adopted(case) and case.told_apart
+
+
+def _nothing_adopted(case: Scored) -> bool:
+    return case.verdict == "ambiguous" and not case.effects
 
 
 def failed(case: Scored) -> bool:
@@ -139,7 +153,7 @@ def right_answer(case: Scored) -> bool:
     """Return whether the verdict is right: the names, `none` for nothing, `unexplained` for a form outside."""
     if case.kind == "outside":
         return unexplained(case)
-    return right(case) if case.truth else case.verdict == "none"
+    return right(case) if case.truth else says_none(case)
 
 
 def wrong_answer(case: Scored) -> bool:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.blind.case import COST, CaseFiles, Cost, NoiseFreeRecord, Scored, Truth, read_noise_free
+from pzd.blind.hide import gap_after_refit
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
+from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import Control
 from pzd.schema.validate import read_json, write_json
+from pzd.signals.nuisance import NuisanceConfig
 
 SMALL_OFFSET = 0.01
 """A preload_offset below this share of the softest record's peak counts as nothing missing."""
@@ -71,6 +74,8 @@ def scored(truth: Truth, cost: Cost, diagnosed: Diagnosed | None, noise_free: No
     diagnosis = diagnosed.diagnosis if diagnosed else None
     adopted = diagnosed if diagnosed and diagnosed.diagnosis.effects else None
     true_effects = counted_effects(truth)
+    is_open = diagnosis is not None and diagnosis.verdict == "ambiguous" and not diagnosis.effects
+    nothing_hidden = truth.kind != "outside" and not true_effects
     return Scored(
         **truth.model_dump(include=_OF_THE_TRUTH),
         **cost.model_dump(),
@@ -87,18 +92,59 @@ def scored(truth: Truth, cost: Cost, diagnosed: Diagnosed | None, noise_free: No
         gap_cut_gains_out=gap_cut(adopted, noise_free, gains_out=True) if adopted else None,
         gap_cut_of_truth=gap_cut_of_truth(adopted, noise_free) if adopted else None,
         next_test=bool(diagnosis and diagnosis.next_test),
+        told_apart=not (diagnosis and is_open and nothing_hidden) or told_apart(truth, noise_free, diagnosis.rivals),
     )
 
 
 def counted_effects(truth: Truth) -> tuple[str, ...]:
     """Return the hidden effects that are large enough to count."""
-    least = {("preload_offset", "F_0"): SMALL_OFFSET * truth.lowest_peak_N, ("sensor_delay", "tau"): SMALL_DELAY}
     small = {
         effect
-        for (effect, parameter), limit in least.items()
+        for (effect, parameter), limit in _least_that_counts(truth).items()
         if effect in truth.damper.effects and np.max(np.abs(truth.damper.effects[effect][parameter])) < limit
     }
     return tuple(name for name in truth.damper.effects if name not in small)
+
+
+def _least_that_counts(truth: Truth) -> dict[tuple[str, str], float]:
+    """Return by effect and parameter the size from which on an effect counts."""
+    return {("preload_offset", "F_0"): SMALL_OFFSET * truth.lowest_peak_N, ("sensor_delay", "tau"): SMALL_DELAY}
+
+
+def told_apart(truth: Truth, noise_free: NoiseFree, rivals: Sequence[str]) -> bool:
+    """Return whether the tests tell the true damper, in which nothing is missing, from that with one of the rivals.
+
+    A rival is held at the smallest size that counts, either way, and T0, C and k are refitted to the noise-free force:
+    what is left beyond the noise is what the likelihood loses. Each test may have as much of an offset or a delay for
+    itself; that loses what its prior says.
+
+    Equation: min(n (g / s)^2 (1 - r) / (1 + r), N (v / p)^2) >= B; n samples of N tests, g gap after the refit, s and r
+    size and correlation of the noise, v the smallest size that counts, p its prior, B `rival_bic` of diagnose
+
+    Parameters
+    ----------
+    truth : of a case in which nothing that counts is hidden
+    noise_free : its noise-free records by name
+    rivals : effects that the diagnosis names; one whose every size counts is always told apart
+    """
+    tests, limit, prior = len(noise_free), DiagnoseConfig().rival_bic, NuisanceConfig()
+    own = {"preload_offset": SMALL_OFFSET / prior.offset, "sensor_delay": SMALL_DELAY / prior.delay_s}
+    if any(name not in own for name in rivals):
+        return True
+    losses = [loss for name in rivals for loss in (*_losses(truth, noise_free, name), tests * own[name] ** 2)]
+    return min(losses, default=limit) >= limit
+
+
+def _losses(truth: Truth, noise_free: NoiseFree, rival: str) -> Iterator[float]:
+    """Yield what the likelihood loses with a rival of the smallest size that counts, to either side."""
+    records = list(noise_free.values())
+    samples = sum(record.force.size for record in records)
+    independent = samples * (1.0 - truth.noise_rho) / (1.0 + truth.noise_rho)
+    for (effect, parameter), least in _least_that_counts(truth).items():
+        for side in (least, -least) if effect == rival else ():
+            effects = {**truth.damper.effects, effect: {parameter: side}}
+            gap = gap_after_refit(records, truth.damper.model_copy(update={"effects": effects}))
+            yield independent * (gap / truth.force_noise) ** 2
 
 
 def _inside(diagnosis: Diagnosis, truth: Truth) -> dict[str, bool]:

@@ -48,7 +48,14 @@ class Line(Frozen):
 
 def lines(cases: Sequence[Scored]) -> list[Line]:
     """Return every target of cases of the virtual rig, in the order of the printed page."""
-    return [*_selection(cases), *_nothing_to_name(cases), *_gap_cuts(cases), *_calibration(cases), *_counts(cases)]
+    return [
+        *_asked(cases),
+        *_selection(cases),
+        *_nothing_to_name(cases),
+        *_gap_cuts(cases),
+        *_calibration(cases),
+        *_counts(cases),
+    ]
 
 
 def campaign_lines(cases: Sequence[Scored]) -> list[Line]:
@@ -58,26 +65,22 @@ def campaign_lines(cases: Sequence[Scored]) -> list[Line]:
         seen, nothing, outside = _by_truth([c for c in cases if c.campaign == name])
         found += [
             rate_line(f"{name}, visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
-            rate_line(f"{name}, visible", "wrong name", seen, rates.wrong_name, "<= 1 %"),
+            rate_line(f"{name}, visible", "wrong name", seen, rates.wrong_name, "<= 0.5 %"),
             rate_line(f"{name}, no effect", "false names", nothing, rates.false_name, "<= 1 %"),
-            rate_line(f"{name}, outside the library, visible", "unexplained", outside, rates.unexplained, ">= 92 %"),
+            rate_line(f"{name}, outside the library, visible", "unexplained", outside, rates.unexplained, ">= 95 %"),
         ]
     return found
 
 
 def independent_lines(cases: Sequence[Scored]) -> list[Line]:
     """Return the targets of cases of the second generator, whose forms outside say what describes them rightly."""
-    seen, nothing, outside = _by_truth(cases)
+    _, _, outside = _by_truth(cases)
     strict = [c for c in outside if not c.described_by]
     return [
-        rate_line("visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
-        rate_line("visible", "right name", seen, rates.right),
-        rate_line("visible", "wrong name", seen, rates.wrong_name, "<= 1 %"),
-        rate_line("no effect", "false names", nothing, rates.false_name, "<= 1 %"),
+        *_asked(cases),
         rate_line(
-            "outside the library, visible", "flagged, or rightly described", outside, rates.rightly_outside, ">= 92 %"
+            "outside the library, visible", "flagged, or rightly described", outside, rates.rightly_outside, ">= 95 %"
         ),
-        rate_line("outside, described by nothing", "unexplained", strict, rates.unexplained),
         rate_line("outside, described by nothing", "a wrong single name", strict, rates.wrong_single),
         *_gap_cuts(cases),
         *_calibration(cases),
@@ -96,6 +99,21 @@ def _by_truth(cases: Sequence[Scored]) -> tuple[list[Scored], list[Scored], list
 
 def _right_or_ambiguous(case: Scored) -> bool:
     return rates.right(case) or rates.ambiguous_with_truth(case)
+
+
+def _asked(cases: Sequence[Scored]) -> Iterator[Line]:
+    """Yield what is asked of the verdicts on either generator: the head of both pages."""
+    seen, nothing, outside = _by_truth(cases)
+    low = [c for c in seen if rates.low_noise(c)]
+    yield rate_line("something of the library hidden", "visible", [c for c in cases if c.truth], rates.visible)
+    yield rate_line("visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %")
+    yield rate_line("visible", "right name", seen, rates.right)
+    yield rate_line("visible, noise to 1 %, all", "right name", low, rates.right, ">= 98 %")
+    yield rate_line("visible", "wrong name", seen, rates.wrong_name, "<= 0.5 %")
+    yield rate_line("no effect", "false names", nothing, rates.false_name, "<= 1 %")
+    yield rate_line("no effect", "left open, nothing adopted", nothing, rates.left_open)
+    strict = [c for c in outside if not c.described_by]
+    yield rate_line("outside, described by nothing, visible", "unexplained", strict, rates.unexplained, ">= 95 %")
 
 
 # --- Lines of rates ---
@@ -144,7 +162,7 @@ def _selection(cases: Sequence[Scored]) -> Iterator[Line]:
     several = [c for c in single if not c.one_frequency]
     seen = [c for c in several if rates.visible(c)]
     for about, mine, targets in (
-        ("visible, noise to 1 %", [c for c in seen if rates.low_noise(c)], (">= 95 %", "<= 1 %", ">= 98 %")),
+        ("visible, noise to 1 %", [c for c in seen if rates.low_noise(c)], ("", "", ">= 98 %")),
         ("visible, noise above 1 %", [c for c in seen if not rates.low_noise(c)], ("", "", "")),
     ):
         yield rate_line(about, "right name", mine, rates.right, targets[0])
@@ -169,10 +187,8 @@ def _both_found(case: Scored) -> bool:
 
 
 def _nothing_to_name(cases: Sequence[Scored]) -> Iterator[Line]:
-    _, nothing, outside = _by_truth(cases)
-    yield rate_line("no effect", "false names", nothing, rates.false_name, "<= 1 %")
+    _, _, outside = _by_truth(cases)
     yield rate_line("outside the library, visible", "a wrong single name", outside, rates.wrong_single, "<= 3 %")
-    yield rate_line("outside the library, visible", "unexplained", outside, rates.unexplained, ">= 92 %")
     yield rate_line("outside the library, visible", "shape among the first two", outside, rates.shape_found, ">= 60 %")
 
 

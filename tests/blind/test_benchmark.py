@@ -25,10 +25,10 @@ import pytest
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.artefacts.diagnosis import Gap
 from pzd.blind.benchmark import Benchmark, ScoredSeed, diagnose_case, enter, read_ledger
-from pzd.blind.case import COST, CaseFiles, NoiseFreeRecord, Scored
+from pzd.blind.case import COST, CaseFiles, NoiseFreeRecord, Scored, Truth
 from pzd.blind.hide import BenchmarkSetup, draw_case, hide
 from pzd.blind.plan import plan
-from pzd.blind.score import gap_cut, gap_cut_of_truth
+from pzd.blind.score import gap_cut, gap_cut_of_truth, told_apart
 from pzd.cli.app import status
 from pzd.config import RunConfig
 from pzd.damper.compose import respond
@@ -377,6 +377,33 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
     # A force that is recorded 2 % too large is that of a damper whose T0, C and k are.
     most = gap_cut_of_truth(said(plain), clean)
     assert most == pytest.approx(cut(stronger.with_effect("asymmetry", {"alpha": 0.1})), abs=1e-3)
+
+
+def test_a_late_force_is_told_from_a_viscous_damper_on_a_soft_spring_by_its_flank_or_several_frequencies() -> None:
+    """At one frequency a viscous damper behind a spring lags as a late force does; a friction shows the spring."""
+
+    def told(friction: float, frequencies: tuple[float, ...], noise: float = 0.01) -> bool:
+        damper = Damper(base=(BaseRow(T0_N=friction, C_Ns_per_m=3000.0, k_N_per_m=2e5),))
+        t, records = np.arange(0.0, 2.0, 2e-3), {}
+        for number, frequency in enumerate(frequencies):
+            w = 2.0 * np.pi * frequency
+            motion = Motion(t, 0.02 * np.sin(w * t), 0.02 * w * np.cos(w * t), -0.02 * w**2 * np.sin(w * t))
+            force = respond(damper, motion)
+            records[f"r{number}"] = NoiseFreeRecord(motion, force, force)
+        truth = Truth(
+            id="00000", seed=1, kind="none", campaign="", effects=(), form=None, form_values={}, damper=damper,
+            sizes={}, force_noise=noise, noise_rho=0.0, displacement_noise_m=0.0, warming=False,
+            one_frequency=len(set(frequencies)) == 1, lowest_peak_N=min(r.peak for r in records.values()),
+            visible_gap=0.0, gap_given_other={},
+        )  # fmt: skip
+        assert told_apart(truth, records, ("sensor_delay", "lash"))  # a play counts at any size
+        return told_apart(truth, records, ("sensor_delay",))
+
+    assert not told(0.0, (1.0, 1.0, 1.0))
+    assert told(0.0, (0.5, 1.0, 4.0))
+    assert told(400.0, (1.0, 1.0, 1.0))
+    assert not told(400.0, (1.0, 1.0, 1.0), noise=0.3)
+    assert not told(400.0, (1.0,))  # the delay of a single test may be its own
 
 
 # --- The ledger ---

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from pzd.blind.case import Scored
-from pzd.blind.rates import Rate, brier_gain, calibration_rows, confidence_holds, rate_rows
+from pzd.blind.rates import Rate, brier_gain, calibration_rows, confidence_holds, rate_rows, right_answer
 from pzd.blind.summary import confusion, write
-from pzd.blind.targets import Line, campaign_lines, lines
+from pzd.blind.targets import Line, campaign_lines, independent_lines, lines
 from pzd.config import RunConfig
 from pzd.quantities import Control
 
@@ -110,6 +110,34 @@ def test_an_effect_too_small_to_be_anything_belongs_to_no_effect(case: Make) -> 
     assert line(said, "no effect", "false names").value == 1.0
 
 
+def test_an_answer_left_open_is_no_false_name_and_none_only_where_the_truth_cannot_be_told(case: Make) -> None:
+    nothing: dict[str, object] = {"kind": "none", "truth": (), "hidden": "none", "visible_gap": 0.0}
+    open_answer: dict[str, object] = {"verdict": "ambiguous", "effects": (), "rivals": ("sensor_delay",)}
+    said = [
+        case(**nothing, **open_answer),
+        case(**nothing, **open_answer, told_apart=False),
+        case(**nothing, verdict="ambiguous", effects=("lash",), rivals=("asymmetry",)),
+        case(**nothing, verdict="none", effects=()),
+    ]
+    assert line(said, "no effect", "false names").value == 0.25
+    assert line(said, "no effect", "left open, nothing adopted").value == 0.25
+    assert [right_answer(one) for one in said] == [False, True, False, True]
+
+
+def test_either_page_holds_the_verdicts_to_the_same_targets(case: Make) -> None:
+    said = [case(), case(visible_gap=0.004), case(kind="none", truth=(), verdict="none", effects=())]
+    said += [case(force_noise=0.02, effects=("lash",)), case(kind="outside", truth=(), verdict="unexplained")]
+    own, independent = lines(said), independent_lines(said)
+    asked = {(one.about, one.figure): (one.value, one.target) for one in own if one in independent}
+    assert asked["something of the library hidden", "visible"] == (2 / 3, "")
+    assert asked["visible", "right, or ambiguous with the truth"] == (0.5, ">= 95 %")
+    assert asked["visible, noise to 1 %, all", "right name"] == (1.0, ">= 98 %")
+    assert asked["visible", "wrong name"] == (0.5, "<= 0.5 %")
+    assert asked["no effect", "false names"] == (0.0, "<= 1 %")
+    assert asked["outside, described by nothing, visible", "unexplained"] == (1.0, ">= 95 %")
+    assert ("rightly named, visible", "gap cut, median") in asked
+
+
 def test_spring_and_mass_must_be_ambiguous_on_one_frequency(case: Make) -> None:
     alone = {"one_frequency": True, "truth": ("gas_spring",), "effects": ("gas_spring",)}
     about = "one frequency, spring or mass"
@@ -206,8 +234,9 @@ def test_gap_cuts_are_of_the_rightly_named_alone(case: Make) -> None:
 
 def test_a_target_is_met_at_its_limit(case: Make) -> None:
     said = [case()] * 95 + [case(verdict="none", effects=())] * 5
-    assert line(said, "visible, noise to 1 %", "right name").met == "met"
-    assert line([*said, case(verdict="none", effects=())], "visible, noise to 1 %", "right name").met == "missed"
+    assert line(said, "visible", "right, or ambiguous with the truth").met == "met"
+    said.append(case(verdict="none", effects=()))
+    assert line(said, "visible", "right, or ambiguous with the truth").met == "missed"
 
 
 def test_every_case_has_one_cell_of_the_matrix(case: Make) -> None:

@@ -221,9 +221,10 @@ def outcome(case: PlannedCase, truth: Truth, answer: Answer) -> str:
         verdict=verdict,
         effects=tuple(effects),
         rivals=tuple(rivals),
+        told_apart=True,
     )
     judged: dict[str, tuple[rates.Predicate, rates.Predicate]] = {
-        "none": (lambda s: s.verdict == "none", rates.false_name),
+        "none": (rates.says_none, rates.false_name),
         "outside": (rates.rightly_outside, rates.wrong_single),
     }
     well, ill = judged.get(case.kind, (lambda s: rates.right(s) or rates.ambiguous_with_truth(s), rates.wrong_name))
