@@ -15,7 +15,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, shown_force
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, prompt_force, shown_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.record import Array, Record
@@ -89,13 +89,15 @@ def test_residuals_and_jacobian_are_those_of_the_whole_damper(effect: str, movin
         prompt = of.model_copy(update={"effects": {n: e for n, e in of.effects.items() if n not in sensors}})
         return o.through_sensors(respond(prompt, o.motion, o.initial_force, tolerance), sensors)
 
-    here = force(0, 0.0, SIMULATION_TOLERANCE)
-    np.testing.assert_allclose(left.simulated[0], o.at_compared(here), atol=1e-6 * o.peak)
-    counted = o.residual_and_slopes(here, np.zeros((here.size, 0)))[:, 0]
+    here, sensors = prompt_force(o, problem.point(x, unknowns).damper)
+    np.testing.assert_allclose(
+        left.simulated[0], o.at_compared(force(0, 0.0, SIMULATION_TOLERANCE)), atol=1e-6 * o.peak
+    )
+    counted = o.residual_and_slopes(here, np.zeros((here.size, 0)), sensors)[:, 0]
     np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-5, atol=1e-5)
     for j in range(x.size):
         slope = (force(j, 2e-5, 1e-11) - force(j, -2e-5, 1e-11)) / 4e-5  # a branch slips at other samples beyond
-        exact = o.residual_and_slopes(here, slope[:, None])[:, 1]
+        exact = o.residual_and_slopes(here, slope[:, None], sensors)[:, 1]
         missed = np.linalg.norm(left.jacobian.dense()[:, j] - exact)
         assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))
 

@@ -117,6 +117,9 @@ def _packed(columns: Array) -> Array | csr_array:
 # --- Weighted records
 
 
+Sensors = Mapping[str, Mapping[str, float]]
+"""Parameters of the effects of the sensor, by effect and name: see `pzd.damper.compose.sensors_of`."""
+NO_SENSORS: Sensors = {}
 SIMULATION_TOLERANCE = 1e-7
 """Tolerance of the path of the element, as a share of the force, in every step by itself.
 
@@ -179,21 +182,18 @@ class WeightedRecord:
     def _compared_indices(self) -> Rows:
         return self.sample_indices[self.compared]
 
-    def through_sensors(
-        self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], delay: float = 0.0
-    ) -> Array:
+    def through_sensors(self, simulated: Array, sensors: Sensors) -> Array:
         """Return simulated values, (m,) or (m, p), as a channel shows them, by a cubic between the samples.
 
         Parameters
         ----------
         simulated : (m,) force [N], or (m, p) of them
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
-        delay : further delay of the channel [s]
         """
-        if not sensors and delay == 0.0:
+        if not sensors:
             return simulated
         begin, time = self._begin, self.motion.time[self._begin :]
-        shown = shown_moments(sensors, time - delay)
+        shown = shown_moments(sensors, time)
         if np.array_equal(shown, time):
             return simulated
         return np.concatenate([simulated[:begin], self._course(simulated)(shown)])
@@ -212,16 +212,19 @@ class WeightedRecord:
         course = cubic(time, simulated)
         return lambda moments: course(np.clip(moments, time[0], time[-1]))
 
-    def delayed(self, shown: Array) -> Callable[[float], Array]:
-        """Return what a channel shows along the motion, (m,) or (m, p), at the compared samples by a delay [s]."""
-        course, moments = self._course(shown), self.motion.time[self._compared_indices]
-        return lambda delay: course(moments - delay)
+    def delayed(self, simulated: Array, sensors: Sensors = NO_SENSORS) -> Callable[[float], Array]:
+        """Return what a channel shows of values along the motion, (m,) or (m, p), where compared, by a delay [s].
+
+        Sensors and delay act in one: a second cubic would round the flank of a dry friction once more, and pay for it.
+        """
+        course, moments = self._course(simulated), self.motion.time[self._compared_indices]
+        return lambda delay: course(shown_moments(sensors, moments - delay))
 
     def standardised(self, values: Array) -> Array:
         """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
         return self.nuisances.marginalised(self._scaled(values))
 
-    def residual_and_slopes(self, force: Array, slopes: Array) -> Array:
+    def residual_and_slopes(self, force: Array, slopes: Array, sensors: Sensors = NO_SENSORS) -> Array:
         """Return the residual and its derivatives (w, 1 + p) in units of noise, every nuisance integrated out.
 
         A delay shifts a force and does not merely add its slope: it is integrated about its likeliest value d.
@@ -231,18 +234,22 @@ class WeightedRecord:
 
         Parameters
         ----------
-        force : (m,) that a channel shows along the motion [N]
-        slopes : (m, p) its derivatives
+        force : (m,) along the motion [N]
+        slopes : (m, p) derivatives of what the channel shows of it
+        sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
         """
         if self.delay_s == 0.0:
+            shown = self.through_sensors(force, sensors)
             return self.standardised(
-                np.column_stack([self.measured - self.at_compared(force), -self.at_compared(slopes)])
+                np.column_stack([self.measured - self.at_compared(shown), -self.at_compared(slopes)])
             )
-        delayed = self.delayed(force)
+        delayed = self.delayed(force, sensors)
         delay = self.likeliest_delay(delayed)
-        shifted = self.delayed(np.column_stack([force, slopes]))(delay)
-        late = (delayed(delay + DELAY_STEP) - shifted[:, 0]) * (self.delay_s / DELAY_STEP)
-        values = np.column_stack([self.measured - shifted[:, 0] + late * (delay / self.delay_s), -shifted[:, 1:], late])
+        shifted = delayed(delay)
+        late = (delayed(delay + DELAY_STEP) - shifted) * (self.delay_s / DELAY_STEP)
+        values = np.column_stack(
+            [self.measured - shifted + late * (delay / self.delay_s), -self.delayed(slopes)(delay), late]
+        )
         scaled = self.standardised(values)
         found, own = scaled[:, :-1], scaled[:, -1]
         square = float(own @ own)
@@ -279,12 +286,16 @@ class WeightedRecord:
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-def shown_force(observation: WeightedRecord, damper: Damper) -> Array:
-    """Simulate the (m,) force of a damper along the motion of an observation, as the channel shows it [N]."""
+def prompt_force(observation: WeightedRecord, damper: Damper) -> tuple[Array, Sensors]:
+    """Simulate the (m,) force of a damper along the motion of an observation [N]; return it with the sensors."""
     sensors = sensors_of(damper)
     prompt = damper.without_effects(*sensors)
-    force = respond(prompt, observation.motion, observation.initial_force, SIMULATION_TOLERANCE)
-    return observation.through_sensors(force, sensors)
+    return respond(prompt, observation.motion, observation.initial_force, SIMULATION_TOLERANCE), sensors
+
+
+def shown_force(observation: WeightedRecord, damper: Damper) -> Array:
+    """Simulate the (m,) force of a damper along the motion of an observation, as the channel shows it [N]."""
+    return observation.through_sensors(*prompt_force(observation, damper))
 
 
 # --- Weights of a record
@@ -508,7 +519,7 @@ def with_nuisances(
 
     Equation: V = [s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
     """
-    averaged, delayed = isinstance(bare.noise, PureError), bare.delayed(shown_force(bare, damper))
+    averaged, delayed = isinstance(bare.noise, PureError), bare.delayed(*prompt_force(bare, damper))
     turns = unresolved_turns(damper, bare.at_compared(bare.motion.displacement), closed=averaged)
     found = replace(bare, delay_s=nuisance.delay_s)
     for _ in range(2):  # the second with the force where the likeliest delay puts it

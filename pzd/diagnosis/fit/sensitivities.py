@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from pzd.damper.compose import (
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
 from pzd.damper.path import Variables
-from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, Sensors, WeightedRecord
 from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
 from pzd.record import Array
 
@@ -36,7 +36,7 @@ class KernelInputs:
     """(k, r) parameter rows of the element at the nodes; without nodes (1, r), or (m, r) along the motion."""
     parallel: Array | None
     """(1, b) or (m, b) rows of the parallel forces; None without any."""
-    sensors: Mapping[str, Mapping[str, float]]
+    sensors: Sensors
     """Parameters of the effects of the sensor, by effect and name."""
     displacement_zero: float
     """Zero of the displacement [m]."""
@@ -186,7 +186,7 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
 
     Returns
     -------
-    (m,) force [N] and (m, d) slopes [N] along the motion, as the channel shows them
+    (m,) force along the motion [N], and the (m, d) slopes of what the channel shows of it [N]
     """
     budget.add(o.motion.time.size * (1 + len(given.pairs)))
     parallel = given.centre.parallel_force(o)
@@ -205,12 +205,12 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
         slopes[:, j] += change
     if not given.centre.sensors:
         return force, slopes
-    shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
+    shown = o.through_sensors(slopes, given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
             change = o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
-            shown[:, 1 + j] += change / width
-    return shown[:, 0], shown[:, 1:]
+            shown[:, j] += change / width
+    return force, shown
 
 
 def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
@@ -291,10 +291,10 @@ def linearise(
     wanted : columns to compute, the others being zero; all where none are given
     """
     residuals, forces, blocks = [], [], []
-    for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        standardised = o.residual_and_slopes(force, slopes)
+    for o, columns, sensors, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
+        standardised = o.residual_and_slopes(force, slopes, sensors)
         residuals.append(standardised[:, 0].copy())
-        forces.append(o.at_compared(force))
+        forces.append(o.at_compared(o.through_sensors(force, sensors)))
         blocks.append((columns, standardised[:, 1:].copy()))
     return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
 
@@ -303,13 +303,13 @@ def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> B
     """Compute the Jacobian of the force at the compared samples [N] by all variables; see `linearise`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
-    return BlockJacobian(x.size, tuple((columns, o.at_compared(slopes)) for o, columns, _, slopes in found))
+    return BlockJacobian(x.size, tuple((columns, o.at_compared(slopes)) for o, columns, *_, slopes in found))
 
 
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
-) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
-    """Yield each observation with its active variables, force (m,) and derivatives (m, columns) along its motion."""
+) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Sensors, Array, Array]]:
+    """Yield each observation with its active variables, sensors, and what `sensitivities` computes along its motion."""
     low, high = limits
     free = low.size
     point = problem.point(x, unknowns)
@@ -327,7 +327,8 @@ def _sensitivities_at(
         columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)
         if o.base_row not in cached or o.base_row < 0 or not shared:
             cached[o.base_row] = search_directions(point, [neighbours[j] for j in columns], o)
-        yield o, columns, *sensitivities(cached[o.base_row], o, problem.budget)
+        directions = cached[o.base_row]
+        yield o, columns, directions.centre.sensors, *sensitivities(directions, o, problem.budget)
 
 
 def active_columns(problem: Problem, unknowns: Sequence[Unknown], o: WeightedRecord, free: int) -> list[int]:

@@ -15,7 +15,7 @@ from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit import least_squares
 from pzd.diagnosis.fit.least_squares import LEVEL, FitResult
-from pzd.diagnosis.fit.likelihood import shown_force
+from pzd.diagnosis.fit.likelihood import prompt_force, shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
@@ -374,9 +374,9 @@ class _TangentSpace:
     def _compared(self, damper: Damper) -> tuple[list[Array], Array]:
         """Return the force of a damper at the compared samples of each observation [N], and all residuals (w,)."""
         observed = self.problem.observations
-        shown = [shown_force(o, damper) for o in observed]
-        left = [o.residual_and_slopes(f, np.zeros((f.size, 0)))[:, 0] for o, f in zip(observed, shown, strict=True)]
-        return [o.at_compared(f) for o, f in zip(observed, shown, strict=True)], np.concatenate(left)
+        simulated = [(o, *prompt_force(o, damper)) for o in observed]
+        left = [o.residual_and_slopes(force, np.zeros((force.size, 0)), s)[:, 0] for o, force, s in simulated]
+        return [o.at_compared(o.through_sensors(force, s)) for o, force, s in simulated], np.concatenate(left)
 
 
 def _traces(problem: Problem, before: FitResult, effect: Effect) -> Iterator[tuple[Array, Array]]:
