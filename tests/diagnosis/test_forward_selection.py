@@ -13,7 +13,7 @@ from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, problem_o
 from pzd.damper.compose import respond
 from pzd.damper.effect import Scales
 from pzd.damper.effects import library, nameable
-from pzd.damper.model import Damper, against_nature
+from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.motion import Motion
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
@@ -50,6 +50,19 @@ def test_two_effects_that_distort_each_other_are_found(rng: np.random.Generator)
     damper = damper_of(TWO, orifice_quadratic={"q": 2500.0}, rounded_yield={"w_s": 0.015})
     told = diagnosed(sines(damper, rng, TWO, jitter=0.01)).diagnosis
     assert set(told.effects) == {"orifice_quadratic", "rounded_yield"}, told.reason
+
+
+def test_an_effect_that_stood_in_for_another_is_begun_afresh_beside_it(rng: np.random.Generator) -> None:
+    """Alone the friction falls over the whole range of speeds, as a power law does; from there no way leads to both."""
+    rows = zip(TWO, (210.0, 450.0), (3600.0, 2900.0), (1.7e6, 2e6), strict=True)
+    base = tuple(BaseRow(voltage_V=U, T0_N=T0, C_Ns_per_m=C, k_N_per_m=k) for U, T0, C, k in rows)
+    effects = {"stribeck_friction": {"F_s": 106.0, "v_s": 0.0102}, "shear_thinning": {"n": 0.4}}
+    tests = ((1.0, 0.005), (1.0, 0.01), (2.0, 0.0036), (2.0, 0.0072))
+    records = sines(Damper(base=base, effects=effects), rng, TWO, jitter=0.01, tests=tests)
+    told = diagnosed(records, forbid=all_but(*effects, "relief_valve")).diagnosis
+    assert (told.verdict, set(told.effects)) == ("named", set(effects)), told.reason
+    found = {name: told.parameters[effect][name].value for effect, values in effects.items() for name in values}
+    assert found == pytest.approx({"F_s": 106.0, "v_s": 0.0102, "n": 0.4}, rel=0.1)
 
 
 def warming(

@@ -210,11 +210,46 @@ class _ForwardSelection:
         varied = per_voltage_candidates(self.evidence.whole, self.current, self.jobs)
         steps = sorted((*tried, *varied), key=lambda c: c.delta_bic)
         first = self._best_supported(steps)
+        closes = first is not None and acceptance.closes_gap(self.evidence, self.config, self.current, first)
+        if not closes and (afresh := self._begun_afresh(tried)):
+            tried = afresh
+            steps = sorted((*tried, *varied), key=lambda c: c.delta_bic)
+            first = self._best_supported(steps)
         if first is None:
             return self._pair(tried)
         ended = converged(self.evidence.whole, self.current, self._physically_possible(first, steps))
         self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _ranked_above(first, steps))
         return True
+
+    def _begun_afresh(self, tried: Sequence[Candidate]) -> tuple[Candidate, ...]:
+        """Fit the candidates that pay with each adopted effect begun from its own starting values beside them.
+
+        An effect adopted alone stands in for what is missing beside it: a friction that falls over the whole range of
+        speeds for a power law. From there the search for both ends in a valley of its own.
+
+        Returns
+        -------
+        the candidates, the better ones in the place of those tried, best first; empty where none is better
+        """
+        whole, current = self.evidence.whole, self.current
+        if not self.evidence.gap_is_significant(current, self.config):
+            return ()
+        found = dict(zip((c.effect for c in tried), tried, strict=True))
+        for each in tried:
+            if each.delta_bic > self.config.adopt_bic or library()[each.effect].place == "material":
+                continue
+            for name in current.effects[len(self.config.force) :]:
+                if name in whole.per_voltage or library()[name].place == "material":
+                    continue
+                again = candidate(whole, refit(whole, each.fitted.damper.without_effects(name)), library()[name])
+                if again.fitted.misfit < found[each.effect].fitted.misfit - thresholds.STUCK_MISFIT:
+                    damper = again.fitted.damper
+                    effects = {key: damper.effects[key] for key in (*current.effects, each.effect)}
+                    better = refit(whole, damper.model_copy(update={"effects": effects}))
+                    found[each.effect] = as_candidate(whole, current, each.effect, better)
+        if all(found[c.effect] is c for c in tried):
+            return ()
+        return tuple(sorted(found.values(), key=lambda c: c.delta_bic))
 
     def _descends_from(self, tried: Sequence[Candidate]) -> bool:
         """Search on from T0, C and k of the best candidate, without its effect; return whether that is a better fit.
