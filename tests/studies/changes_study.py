@@ -1,23 +1,28 @@
 """How often `pzd changes` is right, on pairs of states of dampers of the second generator.
 
-    PYTHONPATH=. python tests/studies/changes_study.py [--pairs N] [--seed S] [--kind changed|same|stand] [--diagnose]
+    PYTHONPATH=. python tests/studies/changes_study.py [--pairs N] [--first I] [--seed S] [--kind changed|same|stand]
+        [--only equal|unlike] [--diagnose] [--log FILE]
 
 Each pair is a damper drawn from the whole space of `pzd/blind/independent`, with one or two laws outside the library in
 both states, on sines (and triangles) at one or more values of the control signal. `changed`: one or two quantities of
 the damper change by 0.5 to 5 % of peak each, `same`: nothing, `stand`: the load cell's zero or gain, or a delay. In a
-third of the changed pairs the second state runs other motions. With `--diagnose` the first state is diagnosed, as the
-command does. A line a pair, then how many are right, ambiguous with the truth among the rivals, incomplete (names of
-the truth, not all of it), silent, or wrong, and how many intervals hold the true change.
+third of the changed pairs the second state runs other motions; `--only` leaves out those of the other kind. With
+`--diagnose` the first state is diagnosed, as the command does. A line a pair, then how many are right, ambiguous with
+the truth among the rivals, incomplete (names of the truth, not all of it), silent, or wrong, and how many intervals of
+`to` hold the true change, with Wilson's 95 % intervals, for equal and unlike motions apart. With `--log` what comes of
+each pair is added to a file, and the summary counts all that the file holds, so that a long study may run in pieces.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
@@ -28,6 +33,7 @@ from pzd.blind.independent import case, stand
 from pzd.blind.independent.kernel import BinghamTable
 from pzd.blind.independent.laws import LAWS, Scale
 from pzd.blind.independent.outside import OUTSIDE
+from pzd.blind.rates import Rate
 from pzd.diagnosis.changes.comparison import changes_between, changes_between_rigs
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import DiagnoseConfig
@@ -55,14 +61,18 @@ class Pair:
     """Factors of T0, C or k, parameters of a law that is newly there, or the stand's doing."""
     outside: tuple[str, ...]
     equal: bool
+    shown: float
+    """Standard errors by which what changed stands clear of what tests of one state differ by, at best."""
 
 
-def pair(seed: int, index: int, kind: str) -> Pair:
-    """Draw a pair."""
+def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | None:
+    """Draw a pair; None where its motions are not those that are asked for."""
     rng = default_rng(SeedSequence(seed, spawn_key=(index, 43)))
     run = stand.campaign(str(rng.choice(CAMPAIGNS)), rng)
     base, actuator = BinghamTable.drawn(run.values, rng), stand.Actuator.drawn(rng)
     equal = kind != "changed" or rng.random() < 2.0 / 3.0
+    if only is not None and equal != (only == "equal"):
+        return None
     other = run if equal else replace(
         run, tests=tuple(replace(t, frequency=1.25 * t.frequency, amplitude=0.85 * t.amplitude) for t in run.tests)
     )  # fmt: skip
@@ -81,14 +91,20 @@ def pair(seed: int, index: int, kind: str) -> Pair:
     names = {"changed": int(rng.integers(1, 3)), "same": 0, "stand": 0}[kind]
     truth: dict[str, Mapping[str, float]] = {}
     second = first
-    for name in rng.choice([*ELEMENT, *NEW], names, replace=False):
-        size = float(np.exp(rng.uniform(*np.log(SIZES))))
-        second, truth[str(name)] = _changed(second, str(name), size, motions, scale, rng)
-    forces = [first.force(m, None) for m in motions]
+    drawn = [str(name) for name in rng.choice([*ELEMENT, *NEW], names, replace=False)]
+    while drawn:
+        name, size = drawn.pop(0), float(np.exp(rng.uniform(*np.log(SIZES))))
+        changed = _changed(second, name, size, motions, scale, rng)
+        if changed is None:  # a valve that never opens, or stands beside another one
+            drawn.append(str(rng.choice([n for n in (*ELEMENT, *NEW) if n != name and n not in {*truth, *drawn}])))
+            continue
+        second, truth[name] = changed
+    forces, later = ([damper.force(m, None) for m in motions] for damper in (first, second))
     peak = max(float(np.max(np.abs(f))) for f in forces)
     chain = stand.Chain.drawn(rng, peak, scale.stroke, run.rate)
     before = _records(motions, forces, chain, peak, base.values, rng)
-    after = _records(others, [second.force(m, None) for m in others], chain, peak, base.values, rng)
+    seconds = later if equal else [second.force(m, None) for m in others]
+    after = _records(others, seconds, chain, peak, base.values, rng)
     if kind == "stand":
         name = str(rng.choice(STAND))
         side = float(rng.choice([-1.0, 1.0]))
@@ -96,13 +112,39 @@ def pair(seed: int, index: int, kind: str) -> Pair:
         by *= side * float(rng.uniform(0.3, 0.95))
         truth[name] = {name: by}
         after = tuple(_seen(r, name, by) for r in after)
-    return Pair(before, after, truth, outside, equal)
+    return Pair(before, after, truth, outside, equal, shown(motions, forces, later, chain.white * peak))
+
+
+def shown(motions: list[stand.Driven], before: list[Array], after: list[Array], white: float) -> float:
+    """Return by how many standard errors the best test of all would find a difference of force that is known.
+
+    Equation: sqrt(sum_t d' (s^2 I + U U')^-1 d), U the offset, gain and delay that tests of the stand have of their own
+                                                    Source: Neyman and Pearson 1933, the likelihood ratio
+
+    Parameters
+    ----------
+    motions : of the tests
+    before, after : true forces in both states [N]
+    white : standard deviation of the noise [N]
+    """
+    errors = [stand.ErrorsOfTest.drawn(default_rng(i), 1.0) for i in range(1000)]
+    offset, gain, delay = (float(np.std([getattr(e, n) for e in errors])) for n in ("offset", "gain", "delay"))
+    squares = 0.0
+    for m, f, g in zip(motions, before, after, strict=True):
+        kept = m.time[::2] >= 0.0
+        own, d = f[kept], (g - f)[kept]
+        slope = np.gradient(own, m.time[::2][kept])
+        U = np.sqrt(2.0) * np.column_stack([np.full(own.size, offset * np.max(np.abs(own))), gain * own, delay * slope])
+        noise = 2.0 * white**2 * own.size / m.time[m.recorded].size
+        pull = U.T @ d / noise
+        squares += float(d @ d / noise - pull @ np.linalg.solve(np.eye(3) + U.T @ U / noise, pull))
+    return float(np.sqrt(squares))
 
 
 def _changed(
     damper: case.HiddenDamper, name: str, size: float, motions: list[stand.Driven], scale: Scale, rng: Generator
-) -> tuple[case.HiddenDamper, Mapping[str, float]]:
-    """Return the damper in which one quantity changed by so much of the peak, and how.
+) -> tuple[case.HiddenDamper, Mapping[str, float]] | None:
+    """Return the damper in which one quantity changed by so much of the peak, and how; None where it cannot.
 
     On the motions that are recorded: coarser and shorter ones show what a law of memory hides otherwise.
     """
@@ -122,7 +164,7 @@ def _changed(
         if max(SIZES[0], 0.8 * size) <= made <= 1.25 * size:
             break
         strength = min(2.0, strength * min(4.0, max(0.2, size / max(float(made), 1e-9))))
-    return changed, values
+    return (changed, values) if made >= SIZES[0] else None
 
 
 def _records(
@@ -194,36 +236,84 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one pair."""
+
+    seed: int
+    index: int
+    kind: str
+    motions: str
+    judged: str
+    damper_named: bool
+    """Whether something of the damper is listed as changed."""
+    held: tuple[bool, ...]
+
+
+def outcome(given: argparse.Namespace, index: int, drawn: Pair) -> Outcome:
+    """Compare a pair, and print its line."""
+    begun = time.process_time()
+    found = compared(drawn, diagnosed=given.diagnose)
+    verdict, holds = judged(found, drawn.changed), tuple(held(found, drawn.changed))
+    names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
+    truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
+    motions, seconds = "equal" if drawn.equal else "unlike", time.process_time() - begun
+    say(
+        f"{index:4d} {motions} {verdict:18s} {found.verdict:11s} {truth} -> {names} rivals {list(found.rivals)} "
+        f"{100 * found.difference.share_of_peak:.2f} % held {list(holds)} outside {'+'.join(drawn.outside)} "
+        f"tests {len(drawn.before)} shown {drawn.shown:.1f} {seconds:.0f} s"
+    )
+    of_damper = any(c.of == "damper" for c in found.changes)
+    return Outcome(given.seed, index, given.kind, motions, verdict, of_damper, holds)
+
+
+def summary(outcomes: Iterable[Outcome]) -> Iterator[str]:
+    """Yield the lines of the summary, by kind and motions."""
+    groups: dict[tuple[str, str], list[Outcome]] = {}
+    for each in outcomes:
+        groups.setdefault((each.kind, each.motions), []).append(each)
+    for (kind, motions), own in groups.items():
+        counts = Counter(each.judged for each in own)
+        yield f"{kind}, {motions} motions, {len(own)} pairs: " + ", ".join(f"{n} {c}" for n, c in counts.most_common())
+        if kind == "changed":
+            yield f"  right or ambiguous with the truth: {_rate(counts['right'] + counts['ambiguous'], len(own))}"
+        yield f"  wrong name: {_rate(sum(c for n, c in counts.items() if n.startswith('wrong')), len(own))}"
+        if kind != "changed":
+            yield f"  something of the damper named: {_rate(sum(each.damper_named for each in own), len(own))}"
+        intervals = [hit for each in own for hit in each.held]
+        yield f"  intervals of `to` that hold: {_rate(sum(intervals), len(intervals))}"
+
+
+def _rate(hits: int, count: int) -> str:
+    low, high = Rate(hits, count).interval
+    share = f"{100.0 * hits / count:.1f} %" if count else "-"
+    return f"{hits} of {count}, {share} ({100.0 * low:.1f} to {100.0 * high:.1f} %)"
+
+
 def main() -> int:
     """Draw, compare and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pairs", type=int, default=20)
+    parser.add_argument("--pairs", type=int, default=20, help="drawn; those that --only leaves out count")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=("changed", "same", "stand"), default="changed")
+    parser.add_argument("--only", choices=("equal", "unlike"))
     parser.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--log", type=Path)
     given = parser.parse_args()
-    counts: dict[bool, Counter[str]] = {True: Counter(), False: Counter()}
-    intervals: list[bool] = []
+    outcomes = []
+    if given.log is not None and given.log.exists():
+        outcomes = [Outcome(**json.loads(line)) for line in given.log.read_text(encoding="utf-8").splitlines()]
     for index in range(given.first, given.first + given.pairs):
-        drawn, begun = pair(given.seed, index, given.kind), time.monotonic()
-        found = compared(drawn, diagnosed=given.diagnose)
-        verdict = judged(found, drawn.changed)
-        counts[drawn.equal][verdict] += 1
-        held_here = list(held(found, drawn.changed))
-        intervals += held_here
-        names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
-        truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
-        motions, seconds = "equal" if drawn.equal else "other", time.monotonic() - begun
-        say(
-            f"{index:4d} {motions} {verdict:18s} {found.verdict:11s} {truth} -> {names} rivals {list(found.rivals)} "
-            f"{100 * found.difference.share_of_peak:.2f} % held {held_here} outside {'+'.join(drawn.outside)} "
-            f"tests {len(drawn.before)} {seconds:.0f} s"
-        )
-    for equal, count in counts.items():
-        if count:
-            say(f"{'equal' if equal else 'other'} motions: {dict(count)} of {count.total()}")
-    say(f"intervals that hold: {sum(intervals)} of {len(intervals)}")
+        drawn = pair(given.seed, index, given.kind, given.only)
+        if drawn is None:
+            continue
+        outcomes.append(outcome(given, index, drawn))
+        if given.log is not None:
+            with given.log.open("a", encoding="utf-8") as log:
+                log.write(json.dumps(asdict(outcomes[-1])) + "\n")
+    for line in summary(outcomes):
+        say(line)
     return 0
 
 
