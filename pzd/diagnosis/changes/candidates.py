@@ -44,6 +44,11 @@ WEAK = 0.9
 """Slope beside C from which an effect without a linear coordinate starts too, as a share of it.
 
 Reason: the linearised step sizes the others; a relief valve that changes the force by a percent does it so."""
+FAINT = 1e-3
+"""The same for an effect of one logarithmic coordinate: a yield that is rounded over a thousandth of the largest speed.
+
+Reason: no linearised step of a logarithm is longer than one, so that a start a hundred times too large promises nothing
+of a change that makes a percent of the force."""
 TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
@@ -295,9 +300,10 @@ def _absent(first: FirstState, name: str) -> Candidate:
         return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
 
     unscaled = all(c.logarithmic for c in coordinates)
+    faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
     grid = itertools.product(
         *(
-            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()))
+            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()), *faint)
             for p in known_effect(name).parameters
         )
     )
