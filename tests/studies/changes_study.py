@@ -60,6 +60,8 @@ class Pair:
     after: tuple[Record, ...]
     changed: Mapping[str, Mapping[str, float]]
     """Factors of T0, C or k, parameters of a law that is newly there, or the stand's doing."""
+    base: BinghamTable
+    """T0, C and k of the first state."""
     outside: tuple[str, ...]
     equal: bool
 
@@ -110,7 +112,7 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
         by *= side * float(rng.uniform(0.3, 0.95))
         truth[name] = {name: by}
         after = tuple(_seen(r, name, by) for r in after)
-    return Pair(before, after, truth, outside, equal)
+    return Pair(before, after, truth, base, outside, equal)
 
 
 def _changed(
@@ -176,16 +178,26 @@ def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
     return "incomplete" if found.verdict != "unchanged" else "silent"
 
 
-def held(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> Iterator[bool]:
-    """Yield of each named truth whether the interval holds the change."""
+def held(found: Changes, drawn: Pair) -> Iterator[bool]:
+    """Yield of each named truth whether the interval of `to` holds the true change, `from` held."""
     for c in found.changes:
-        given = truth.get(c.name, {})
+        given = drawn.changed.get(c.name, {})
         if "factor" in given:
-            columns = (np.atleast_1d(np.array(each, dtype=float)) for each in (c.from_, c.low95, c.high95))
-            start, low, high = columns
-            yield from (bool(a <= given["factor"] * s <= b) for s, a, b in zip(start, low, high, strict=True))
+            start, low, high = (np.atleast_1d(np.array(each, dtype=float)) for each in (c.from_, c.low95, c.high95))
+            own = np.interp(c.at_voltage_V or (drawn.base.values[0],), drawn.base.values, getattr(drawn.base, c.name))
+            yield from ((low <= (true := _moved(c.name, start, own, given["factor"]))) & (true <= high)).tolist()
         elif c.parameter in given and isinstance(c.low95, float) and isinstance(c.high95, float):
             yield c.low95 <= given[c.parameter] <= c.high95
+
+
+def _moved(name: str, start: Array, own: Array, factor: float) -> Array:
+    """Return the value after a true change from the value that was identified before.
+
+    Equation: T0 + dT0, C + dC, 1 / (1/k + d(1/k)): what the force shows is the change of T0, C and the compliance
+    """
+    if name == "k":
+        return np.asarray(1.0 / (1.0 / start + (1.0 / factor - 1.0) / own))
+    return np.asarray(start + (factor - 1.0) * own)
 
 
 def compared(given: Pair, *, diagnosed: bool) -> Changes:
@@ -226,7 +238,7 @@ def outcome(given: argparse.Namespace, index: int, drawn: Pair) -> Outcome:
     """Compare a pair, and print its line."""
     begun = time.process_time()
     found = compared(drawn, diagnosed=not given.plain)
-    verdict, holds = judged(found, drawn.changed), tuple(held(found, drawn.changed))
+    verdict, holds = judged(found, drawn.changed), tuple(held(found, drawn))
     names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
     truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
     motions, seconds = "equal" if drawn.equal else "unlike", time.process_time() - begun

@@ -480,9 +480,10 @@ class Findings:
         if not best.candidates:
             return []
         covariance = self.search.regression.covariance(best)
-        # A model that misses a share of the force knows how the force follows a parameter to that share.
-        missed = self.search.regression.likelihood.known_discrepancy * best.values
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + self._unnamed(best) ** 2)
+        slopes = self._slopes(best)
+        unnamed = self._hides(self.search.left(best), slopes)
+        missed = self._missed_of_response(best, slopes) * best.values
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -498,12 +499,28 @@ class Findings:
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
 
-    def _unnamed(self, best: Fitted) -> Array:
-        """Return the (p,) standard error of the coordinates by what is left: the whole of it may be theirs."""
+    def _slopes(self, best: Fitted) -> Array:
+        """Return (p,) the r.m.s. force by one unit of every coordinate, each test in units of its peak."""
         columns = self.search.regression.columns(best.coordinates, best.values)
         squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self.comparisons, strict=True)]
-        slopes = np.sqrt(np.mean(squares, axis=0))
-        return np.where(slopes > 0.0, self.search.left(best) / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
+        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
+    @staticmethod
+    def _hides(force: float, slopes: Array) -> Array:
+        """Return the (p,) standard error of coordinates by a force without a name: the whole of it may be theirs."""
+        return np.where(slopes > 0.0, force / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
+
+    def _missed_of_response(self, best: Fitted, slopes: Array) -> Array:
+        """Return (p,) the share to which it is not known how the force follows a coordinate.
+
+        A model that misses a share of the force knows this to that share. T0, C and k themselves are no better known
+        in the first state than what it misses there leaves open, and the force follows them in proportion.
+        """
+        share = self.search.regression.likelihood.known_discrepancy
+        force = [np.sum(stacked(c.reference) ** 2) / c.peak**2 for c in self.comparisons]
+        own = np.minimum(self._hides(share * float(np.sqrt(np.mean(force))), slopes), 1.0)
+        of_element = np.array([c.name in ELEMENT_COLUMNS for c in best.coordinates])
+        return np.where(of_element, np.maximum(own, share), share)
 
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]
