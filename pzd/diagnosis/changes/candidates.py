@@ -22,6 +22,7 @@ from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
+from pzd.diagnosis.changes.state import about, acts_at_a_place
 from pzd.diagnosis.fit.problem import BOUND
 from pzd.record import Array, Complex
 
@@ -132,6 +133,8 @@ class FirstState:
     force: float
     """Largest force [N]."""
     scales: Scales
+    middle_m: float
+    """Displacement from which effects count that act at a place of the stroke: the middle of that of all tests."""
 
     def changed(self, coordinates: Sequence[Coordinate], values: Sequence[float], warmer: float | None) -> Damper:
         """Return the damper in which some coordinates have other values; those of the stand are left out.
@@ -145,6 +148,7 @@ class FirstState:
         rows = {id(row): row for row in self.damper.base}
         groups = rows_per_voltage(self.damper.base)
         effects = {name: dict(own) for name, own in self.damper.effects.items()}
+        placed = []
         for c, x in zip(coordinates, values, strict=True):
             if c.of == "stand" or c.parameter == SHARE:
                 continue
@@ -152,10 +156,19 @@ class FirstState:
                 of_node = range(len(groups)) if c.node is None else (c.node,)
                 for original in (row for i in of_node for row in groups[i][1]):
                     rows[id(original)] = self._row(rows[id(original)], c, x, warmer)
+            elif acts_at_a_place(c.name):
+                placed.append((c, x))
             else:
                 self._move_effect(effects, c, x)
         base = tuple(rows[id(row)] for row in self.damper.base)
-        return self.damper.model_copy(update={"base": base, "effects": effects})
+        damper = self.damper.model_copy(update={"base": base, "effects": effects})
+        if not placed:
+            return damper
+        damper = about(damper, self.middle_m)
+        effects = {name: dict(own) for name, own in damper.effects.items()}
+        for c, x in placed:
+            self._move_effect(effects, c, x)
+        return damper.model_copy(update={"effects": effects})
 
     def _row(self, row: BaseRow, c: Coordinate, x: float, warmer: float | None) -> BaseRow:
         if c.name == "temperature":

@@ -46,7 +46,7 @@ from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
-from pzd.record import CONSTANT_SHARE, Array
+from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
 from pzd.signals.nuisance import NuisanceConfig
@@ -131,7 +131,8 @@ def findings_between(
     known = _own_missed(before, diagnose.nuisance)
     comparisons = comparisons_of(before, after, identify, diagnose.nuisance, known)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
-    first = FirstState(about(before.damper, mean), max(c.peak for c in comparisons), before.scales())
+    peak, middle = max(c.peak for c in comparisons), mid_stroke(r.displacement for r in before.records)
+    first = FirstState(about(before.damper, mean), peak, before.scales(), middle)
     likelihood = Likelihood(comparisons, diagnose.nuisance, known.share)
     regression = Regression(likelihood, Response(first, comparisons))
     search = Search(

@@ -247,3 +247,21 @@ def test_a_yield_that_rounds_over_a_thousandth_of_the_speed_is_named(rng: np.ran
     changes = found(campaign(damper, rng), campaign(rounded, rng))
     assert "rounded_yield" in names_told(changes)
     assert changes.changes[0].to == pytest.approx(1.5e-3 * SPEED, rel=0.3)
+
+
+def test_a_stop_stands_where_it_is_whatever_middle_the_tests_have(rng: np.random.Generator) -> None:
+    """Short strokes run beside the middle of the whole one, so that the mean of all tests lies elsewhere."""
+    damper, values = drawn_damper(rng, voltages=(0.0,)), {"k_e": 2.0e6, "x_e": 0.02}
+
+    def aside(records: tuple[Record, ...]) -> list[Record]:
+        return [replace(r, displacement=r.displacement + 0.01 * (np.ptp(r.displacement) < 0.05)) for r in records]
+
+    def stopped(r: Record) -> Record:
+        beyond = np.maximum(np.abs(r.displacement) - values["x_e"], 0.0)
+        return replace(r, force=r.force + values["k_e"] * beyond**2 * np.sign(r.displacement))
+
+    after = [stopped(r) for r in aside(campaign(damper, rng))]
+    changes = found(aside(campaign(damper, rng)), after)
+    assert names(changes) == ["end_stop"]
+    to = {c.parameter: c.to for c in changes.changes}
+    assert to == pytest.approx(values, rel=0.1)
