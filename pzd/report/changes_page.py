@@ -92,7 +92,7 @@ def course_page(found: Followed, control: Control) -> str:
 
 def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
     name = spelled(row.name) if row.name == row.parameter else f"{spelled(row.name)} {row.parameter}"
-    figure, ax = axes("state", f"{name} [{row.unit}]")
+    figure, ax = axes("state", f"{name} [{row.unit}]", labels=("-000000",), slanted=course.states)
     places = np.arange(len(course.states))
     for i in range(len(row.at_voltage_V or (None,))):
         middle, low, high = (
@@ -104,7 +104,6 @@ def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
         ax.errorbar(places, middle, spread, fmt="o-", markersize=4.0, capsize=2.0, label=label)
     for limit in row.limits or ():
         ax.axhline(limit, color=BASELINE, linestyle="--", linewidth=1.0)
-    ax.set_xticks(places, course.states, rotation=20.0)
     if row.at_voltage_V is not None:
         legend(figure)
     return Panel(figure, name, f"{name} over the states {', '.join(course.states)}, with 95 % intervals.", "")

@@ -98,6 +98,8 @@ class Plot:
 _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
 """Width of a letter of a tick label."""
+_SLANT_DEG = 20.0
+"""Of names below the horizontal axis, which side by side would overlap."""
 _LEGEND_COLUMNS = 4
 
 
@@ -109,6 +111,7 @@ def axes(
     labels: Iterable[str] = ("-0.000",),
     key: int = 1,
     right: float = 0.2,
+    slanted: Iterable[str] = (),
 ) -> tuple[Figure, Axes]:
     """Return an empty figure of one axes, of a size that stays readable on a telephone.
 
@@ -119,6 +122,7 @@ def axes(
     labels : of the ticks of the vertical axis; the longest decides where the axes begin
     key : lines of a legend for which room is kept above
     right : margin to the right [in]
+    slanted : names in the place of the ticks of the horizontal axis, which end at their place
 
     Returns
     -------
@@ -126,11 +130,18 @@ def axes(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(_WIDTH_IN, height))
-    left = 0.33 + _LETTER_IN * max(len(shortened(label)) for label in labels)
-    below, above = 0.5, 0.1 + 0.21 * key
+    names = [shortened(name) for name in slanted]
+    longest, first = (_LETTER_IN * len(name) for name in (max(names, key=len, default=""), names[0] if names else ""))
+    lower = longest * np.sin(np.radians(_SLANT_DEG))
+    figure = Figure(figsize=(_WIDTH_IN, height + lower))
+    height += lower
+    left = max(0.33 + _LETTER_IN * max(len(shortened(label)) for label in labels), first)
+    below, above = 0.5 + lower, 0.1 + 0.21 * key
     box = (left / _WIDTH_IN, below / height, 1.0 - (left + right) / _WIDTH_IN, 1.0 - (below + above) / height)
-    return figure, figure.add_axes(box, xlabel=x, ylabel=y)
+    drawn = figure.add_axes(box, xlabel=x, ylabel=y)
+    if names:
+        drawn.set_xticks(np.arange(len(names)), names, rotation=_SLANT_DEG, ha="right", rotation_mode="anchor")
+    return figure, drawn
 
 
 _SHARE_BELOW = 0.32

@@ -13,7 +13,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array, Record
 from pzd.report.damper_models import DamperModels
-from pzd.report.drawing import encoded
+from pzd.report.drawing import axes, encoded, styled
 from pzd.report.plots.gap import held_out_records, record_gap
 from pzd.report.plots.residuals import between_cycles, fit_alone, quantiles, spectra
 
@@ -107,3 +107,18 @@ def test_names_of_sixty_letters_leave_room_for_the_plot_and_stay_apart() -> None
     assert all(label.startswith("damper_12_") and label[-1] in "123" for label in shown)
     assert ax.get_position().width > 0.3
     assert encoded(panel).source.startswith("data:image/svg+xml")
+
+
+@pytest.mark.parametrize("name", ["0", "cycles 1-20", "damper_12_after_endurance_run_one"])
+def test_names_of_states_below_an_axis_and_its_label_lie_within_the_picture(name: str) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with styled():
+        figure, ax = axes("state", "T0 [N]", slanted=(name, name, name))
+        ax.plot(range(3), range(3))
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        words = [*ax.get_xticklabels(), ax.xaxis.label]
+        boxes = [word.get_window_extent(canvas.get_renderer()) for word in words]
+        width, height = canvas.get_width_height()
+    assert all(b.x0 >= 0.0 and b.y0 >= 0.0 and b.x1 <= width and b.y1 <= height for b in boxes)

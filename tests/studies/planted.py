@@ -94,7 +94,7 @@ def planted(records: Sequence[Record], name: str, values: Mapping[str, float]) -
     return found
 
 
-def study(given: Opened, share: float) -> None:
+def study(given: Opened, share: float, only: Sequence[str]) -> None:
     """Print a line for each plant in the tests of a config."""
     config, control = given.config, given.run.control
     execute(given, "ingest", force=False, jobs=1, say=lambda _: None)
@@ -107,6 +107,8 @@ def study(given: Opened, share: float) -> None:
 
     first = state("before", before)
     for name, values in plants(before, share).items():
+        if only and name not in only:
+            continue
         second = state("after", planted(after, name, values))
         found = changes_between(first, second, config.diagnose, config.identify, control).changes
         told = {c.name for c in found.changes} | set(found.rivals)
@@ -179,7 +181,7 @@ def main() -> int:
             if arguments.diagnose:
                 diagnose_study(given, arguments.share, arguments.only)
             else:
-                study(given, arguments.share)
+                study(given, arguments.share, arguments.only)
     return 0
 
 

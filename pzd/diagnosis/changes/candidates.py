@@ -22,6 +22,7 @@ from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
+from pzd.diagnosis.changes.state import about, acts_at_a_place
 from pzd.diagnosis.fit.problem import BOUND
 from pzd.record import Array, Complex
 
@@ -44,6 +45,11 @@ WEAK = 0.9
 """Slope beside C from which an effect without a linear coordinate starts too, as a share of it.
 
 Reason: the linearised step sizes the others; a relief valve that changes the force by a percent does it so."""
+FAINT = 1e-3
+"""The same for an effect of one logarithmic coordinate: a yield that is rounded over a thousandth of the largest speed.
+
+Reason: no linearised step of a logarithm is longer than one, so that a start a hundred times too large promises nothing
+of a change that makes a percent of the force."""
 TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
@@ -127,6 +133,8 @@ class FirstState:
     force: float
     """Largest force [N]."""
     scales: Scales
+    middle_m: float
+    """Displacement from which effects count that act at a place of the stroke: the middle of that of all tests."""
 
     def changed(self, coordinates: Sequence[Coordinate], values: Sequence[float], warmer: float | None) -> Damper:
         """Return the damper in which some coordinates have other values; those of the stand are left out.
@@ -140,6 +148,7 @@ class FirstState:
         rows = {id(row): row for row in self.damper.base}
         groups = rows_per_voltage(self.damper.base)
         effects = {name: dict(own) for name, own in self.damper.effects.items()}
+        placed = []
         for c, x in zip(coordinates, values, strict=True):
             if c.of == "stand" or c.parameter == SHARE:
                 continue
@@ -147,10 +156,19 @@ class FirstState:
                 of_node = range(len(groups)) if c.node is None else (c.node,)
                 for original in (row for i in of_node for row in groups[i][1]):
                     rows[id(original)] = self._row(rows[id(original)], c, x, warmer)
+            elif acts_at_a_place(c.name):
+                placed.append((c, x))
             else:
                 self._move_effect(effects, c, x)
         base = tuple(rows[id(row)] for row in self.damper.base)
-        return self.damper.model_copy(update={"base": base, "effects": effects})
+        damper = self.damper.model_copy(update={"base": base, "effects": effects})
+        if not placed:
+            return damper
+        damper = about(damper, self.middle_m)
+        effects = {name: dict(own) for name, own in damper.effects.items()}
+        for c, x in placed:
+            self._move_effect(effects, c, x)
+        return damper.model_copy(update={"effects": effects})
 
     def _row(self, row: BaseRow, c: Coordinate, x: float, warmer: float | None) -> BaseRow:
         if c.name == "temperature":
@@ -295,9 +313,10 @@ def _absent(first: FirstState, name: str) -> Candidate:
         return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
 
     unscaled = all(c.logarithmic for c in coordinates)
+    faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
     grid = itertools.product(
         *(
-            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()))
+            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()), *faint)
             for p in known_effect(name).parameters
         )
     )

@@ -46,7 +46,7 @@ from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
-from pzd.record import CONSTANT_SHARE, Array
+from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
 from pzd.signals.nuisance import NuisanceConfig
@@ -131,7 +131,8 @@ def findings_between(
     known = _own_missed(before, diagnose.nuisance)
     comparisons = comparisons_of(before, after, identify, diagnose.nuisance, known)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
-    first = FirstState(about(before.damper, mean), max(c.peak for c in comparisons), before.scales())
+    peak, middle = max(c.peak for c in comparisons), mid_stroke(r.displacement for r in before.records)
+    first = FirstState(about(before.damper, mean), peak, before.scales(), middle)
     likelihood = Likelihood(comparisons, diagnose.nuisance, known.share)
     regression = Regression(likelihood, Response(first, comparisons))
     search = Search(
@@ -480,9 +481,10 @@ class Findings:
         if not best.candidates:
             return []
         covariance = self.search.regression.covariance(best)
-        # A model that misses a share of the force knows how the force follows a parameter to that share.
-        missed = self.search.regression.likelihood.known_discrepancy * best.values
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + self._unnamed(best) ** 2)
+        slopes = self._slopes(best)
+        unnamed = self._hides(self.search.left(best), slopes)
+        missed = self._missed_of_response(best, slopes) * best.values
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -498,12 +500,28 @@ class Findings:
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
 
-    def _unnamed(self, best: Fitted) -> Array:
-        """Return the (p,) standard error of the coordinates by what is left: the whole of it may be theirs."""
+    def _slopes(self, best: Fitted) -> Array:
+        """Return (p,) the r.m.s. force by one unit of every coordinate, each test in units of its peak."""
         columns = self.search.regression.columns(best.coordinates, best.values)
         squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self.comparisons, strict=True)]
-        slopes = np.sqrt(np.mean(squares, axis=0))
-        return np.where(slopes > 0.0, self.search.left(best) / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
+        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
+    @staticmethod
+    def _hides(force: float, slopes: Array) -> Array:
+        """Return the (p,) standard error of coordinates by a force without a name: the whole of it may be theirs."""
+        return np.where(slopes > 0.0, force / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
+
+    def _missed_of_response(self, best: Fitted, slopes: Array) -> Array:
+        """Return (p,) the share to which it is not known how the force follows a coordinate.
+
+        A model that misses a share of the force knows this to that share. T0, C and k themselves are no better known
+        in the first state than what it misses there leaves open, and the force follows them in proportion.
+        """
+        share = self.search.regression.likelihood.known_discrepancy
+        force = [np.sum(stacked(c.reference) ** 2) / c.peak**2 for c in self.comparisons]
+        own = np.minimum(self._hides(share * float(np.sqrt(np.mean(force))), slopes), 1.0)
+        of_element = np.array([c.name in ELEMENT_COLUMNS for c in best.coordinates])
+        return np.where(of_element, np.maximum(own, share), share)
 
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]

@@ -166,11 +166,15 @@ class Search:
             for i, p in enumerate(promising)
             if i < FITTED or p.candidate.name in ELEMENT_COLUMNS or p.candidate.of == "stand"
         ]
-        # What leaves more of the force than its absence, the tests taken to differ alike, does not explain it.
+        # What visibly leaves more than its absence, the tests taken to differ alike, does not explain it.
         tried = (self._with(before, p) for p in worth)
-        fits = [f for f in tried if self._admissible(f, least(f)) and self.left(f) < self.left(before, f.scatter)]
+        fits = [f for f in tried if self._admissible(f, least(f)) and self._leaves_less(f, before)]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
+
+    def _leaves_less(self, fitted: Fitted, before: Fitted) -> bool:
+        """Whether a fit leaves less than its absence, or nothing visible, where the criterion alone decides."""
+        return self.left(fitted) < max(self.left(before, fitted.scatter), self.visible)
 
     # --- The steps
 
@@ -379,13 +383,17 @@ class Search:
         return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted))]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
-        """Whether a fit does what the best one does: nearly as likely, or as good where much has no name.
+        """Whether a fit does what the best one does: nearly as likely, or it leaves no more than the model misses.
+
+        Where much has no name one that is as good is enough, if it explains most of what the change does.
 
         One with more numbers has to pay for them: else it is the same change told at greater length.
         """
         if fitted.values.size > best.values.size:
             return fitted.bic <= best.bic
         if fitted.bic <= best.bic + self.rival_bic:
+            return True
+        if self.left(fitted) <= self._hidden(best):
             return True
         if self.left(best) < AS_GOOD * self._least(best):
             return False

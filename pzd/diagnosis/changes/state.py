@@ -89,12 +89,17 @@ def diagnosed_state(
     return replace(state, damper=found.damper)
 
 
+def acts_at_a_place(name: str) -> bool:
+    """Whether an effect acts at a place of the stroke, so that no force and stiffness make up for another zero."""
+    return name == "accumulator" or (name in library() and library()[name].needs_displacement_zero)
+
+
 def about(damper: Damper, zero: float) -> Damper:
     """Return the same damper with the force and stiffness beside the element about another displacement [m].
 
     Equation: F_0 + k_g (x - z) = (F_0 + k_g (z' - z)) + k_g (x - z')
     """
-    if any(name in library() and library()[name].needs_displacement_zero for name in damper.effects):
+    if any(acts_at_a_place(name) for name in damper.effects):
         return damper
     effects: Effects = {name: dict(values) for name, values in damper.effects.items()}
     stiffness = effects.get("gas_spring", {}).get("k_g", 0.0)

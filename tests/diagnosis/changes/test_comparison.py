@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import campaign, drawn_damper, found, likelihood_between, names, names_told, scaled
+from states import SPEED, campaign, drawn_damper, found, likelihood_between, names, names_told, scaled
 
 from pzd.artefacts.changes import Change
-from pzd.damper.model import Damper
+from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.regression import LEVEL, SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.record import Record
 from pzd.schema.errors import DataError
@@ -237,3 +237,31 @@ def test_what_the_model_misses_is_carried_over_from_the_nearest_motion(rng: np.r
         assert "T0" in names_told(changes)
         assert names(changes) in ([], ["T0"])
         assert all(inside(change, 1.15) for change in changes.changes if change.name == "T0")
+
+
+def test_a_yield_that_rounds_over_a_thousandth_of_the_speed_is_named(rng: np.random.Generator) -> None:
+    """Its size enters by a logarithm alone: no linearised step from a hundred times as much tells of it."""
+    row = BaseRow(voltage_V=0.0, T0_N=1400.0, C_Ns_per_m=1500.0, k_N_per_m=1.2e6)
+    damper = Damper(base=(row,))
+    rounded = damper.with_effect("rounded_yield", {"w_s": 1.5e-3 * SPEED})
+    changes = found(campaign(damper, rng), campaign(rounded, rng))
+    assert "rounded_yield" in names_told(changes)
+    assert changes.changes[0].to == pytest.approx(1.5e-3 * SPEED, rel=0.3)
+
+
+def test_a_stop_stands_where_it_is_whatever_middle_the_tests_have(rng: np.random.Generator) -> None:
+    """Short strokes run beside the middle of the whole one, so that the mean of all tests lies elsewhere."""
+    damper, values = drawn_damper(rng, voltages=(0.0,)), {"k_e": 2.0e6, "x_e": 0.02}
+
+    def aside(records: tuple[Record, ...]) -> list[Record]:
+        return [replace(r, displacement=r.displacement + 0.01 * (np.ptp(r.displacement) < 0.05)) for r in records]
+
+    def stopped(r: Record) -> Record:
+        beyond = np.maximum(np.abs(r.displacement) - values["x_e"], 0.0)
+        return replace(r, force=r.force + values["k_e"] * beyond**2 * np.sign(r.displacement))
+
+    after = [stopped(r) for r in aside(campaign(damper, rng))]
+    changes = found(aside(campaign(damper, rng)), after)
+    assert names(changes) == ["end_stop"]
+    to = {c.parameter: c.to for c in changes.changes}
+    assert to == pytest.approx(values, rel=0.1)
