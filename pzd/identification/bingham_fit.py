@@ -97,12 +97,17 @@ class Objective:
         """Weight (N,) of the counted samples: 0 beside an unresolved jump of the force, else 1."""
         return np.concatenate([t.weight[t.counted] for t in self.prepared])
 
+    @cached_property
+    def _all_count(self) -> bool:
+        return bool(np.all(self.weight == 1.0))
+
     def projected(self, values: Array) -> Array:
         """Project the basis out of forces (N,) or (N, p), samples beside an unresolved jump left out.
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
-        values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
+        if not self._all_count:
+            values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
@@ -242,6 +247,8 @@ SAME_OPTIMUM = 1e-6
 """Relative difference of the criteria of two descents at the same optimum."""
 _CACHED_POINTS = 2
 """Points whose forces are cached: the current one of a descent, and its last trial step."""
+_ROWS_AT_A_TIME = 8192
+"""Rows of slopes and residuals that are reduced at a time: 256 kB."""
 TOLERANCE = 1e-12
 """Relative tolerance of the least squares on parameters and criterion."""
 EVALUATIONS = 100
@@ -323,11 +330,15 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     def reduced(fit: Fit, x: Array) -> Array:
         """Return the triangle (4, 4) with the inner products of slopes and residuals.
 
-        Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
+        Least squares on four rows takes the same steps as on N rows, and costs next to nothing. Triangles of so many
+        rows as lie in the cache of a processor are made first, and one of all of them.
         """
-        together = np.column_stack([-fit.slopes @ objective.coordinates.slopes(x), fit.residuals])
-        together /= norm
-        return np.asarray(np.linalg.qr(together, mode="r"))
+        turned, triangles = -objective.coordinates.slopes(x).T / norm, []
+        for first in range(0, fit.residuals.size, _ROWS_AT_A_TIME):
+            rows = slice(first, first + _ROWS_AT_A_TIME)
+            together = np.vstack([turned @ fit.slopes[rows].T, fit.residuals[None, rows] / norm])
+            triangles.append(np.linalg.qr(together.T, mode="r"))
+        return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))
 
     memory: dict[bytes, tuple[Fit, Array]] = {}
 

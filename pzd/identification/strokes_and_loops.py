@@ -89,7 +89,7 @@ class Stroke:
             inner = self.between(*MIDDLE_PART)
             force = _value_at_zero(self.displacement[inner] - self.middle, self.force[inner], 1)
             return float(np.polyfit(t - t[0], x, 1)[0]), force
-        course, half = self._course()
+        course, half = self._course
         fastest = _steepest_place(course)
         near = self._around_middle
         s = (self.time[near] - self.time[near][0]) / half - 1.0 - fastest
@@ -102,6 +102,7 @@ class Stroke:
         """Samples around mid-stroke."""
         return self.between(0.5 - 0.5 * AROUND_PEAK, 0.5 + 0.5 * AROUND_PEAK)
 
+    @cached_property
     def _course(self) -> tuple[np.polynomial.Polynomial, float]:
         """Return the displacement around mid-stroke [m] over time from -1 to 1, and half of that time [s]."""
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
@@ -110,7 +111,7 @@ class Stroke:
 
     def _has_one_peak(self) -> bool:
         """Tell whether the motion around mid-stroke is smooth, and fastest inside and not at its ends."""
-        course, half = self._course()
+        course, half = self._course
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
         left = x - course((t - t[0]) / half - 1.0)
         return bool(np.sqrt(np.mean(left**2)) <= SMOOTHNESS * self.length) and abs(_steepest_place(course)) < 1.0

@@ -377,9 +377,9 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     for record in records:
         both = np.hstack([record.slopes / scale, record.nuisances])
         place = np.r_[:size, at : at + record.nuisances.shape[1]]
-        weighed = both[record.calm] / np.sqrt(_noise_variance(record))
-        normal[np.ix_(place, place)] += weighed.T @ weighed
-        right[place] += weighed.T @ (record.residuals[record.calm] / np.sqrt(_noise_variance(record)))
+        calm, noise = (slice(None) if record.calm.all() else record.calm), _noise_variance(record)
+        normal[np.ix_(place, place)] += both[calm].T @ both[calm] / noise
+        right[place] += both[calm].T @ record.residuals[calm] / noise
         columns.append((both, place))
         at += record.nuisances.shape[1]
     normal[np.diag_indices(whole)] += np.where(np.arange(whole) < size, 1e-12 * np.trace(normal), 1.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pzd.record import Array, Record
 from pzd.signals.harmonics import MAINS
-from pzd.signals.measures import resolution, usual_step
+from pzd.signals.measures import found_once, resolution, usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
 from pzd.signals.smoothing import HIGHEST, low_pass
 from pzd.signals.splines import cubic
@@ -84,6 +84,7 @@ class Cycles:
         """Return the number of samples in one cycle, rounded down: the length of a folded cycle."""
         return max(int(np.floor(self.period / usual_step(time) + 1e-6)), 4)
 
+    @found_once
     def fold(self, time: Array, values: Array) -> Array:
         """Interpolate values (n,) by a cubic spline at the points of the cycles, one row a cycle (count, points)."""
         instants = self.instants(time)
@@ -92,6 +93,7 @@ class Cycles:
         near = (time >= instants[0, 0] - reach) & (time <= instants[-1, -1] + reach)
         return cubic(time[near], values[near])(instants)
 
+    @found_once
     def instants(self, time: Array) -> Array:
         """Return the times (count, points) of the points of the cycles [s]."""
         points = self.points(time)
@@ -325,7 +327,7 @@ MEDIAN_OF_NORMAL = 0.6745
 def decimated_means(time: Array, values: Array, period: float, points: int) -> tuple[Array, Array]:
     """Thin a record to at least so many points a cycle and both its ends, each the mean of the samples around it."""
     every = max(int(period / usual_step(time)) // points, 1)
-    at = np.unique(np.append(np.arange(0, time.size, every), time.size - 1))
+    at = np.append(np.arange(0, time.size - 1, every), time.size - 1)
     reach = np.minimum(every // 2, np.minimum(at, time.size - 1 - at))
     sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
     return time[at], values[0] + (sums[at + reach + 1] - sums[at - reach]) / (2 * reach + 1)

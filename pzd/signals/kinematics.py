@@ -53,7 +53,7 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
     repeating = Kinematics(*(one + other for one, other in zip(cyclic, drift, strict=True)))
     if inside.all():
         return repeating
-    motion = _smoothed_motion(time, displacement, resolution(displacement))
+    motion = Kinematics(*(np.array(each) for each in _smoothed_motion(time, displacement, resolution(displacement))))
     for whole, part in zip(motion, repeating, strict=True):
         whole[inside] = part
     return motion

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pzd.record import Array
+from pzd.signals.measures import found_once
 
 _ROOT = float(np.sqrt(3.0)) - 2.0
 """Root of z^2 + 4 z + 1: what an end of the samples adds to the coefficients dies away with its powers."""
@@ -35,6 +36,7 @@ def cubic(time: Array, values: Array) -> Callable[[Array], Array]:
     return lambda moments: course((moments - time[0]) / step)
 
 
+@found_once
 def is_even(time: Array) -> bool:
     """Whether samples (n,), n >= 2, lie on an even clock."""
     clock = np.linspace(time[0], time[-1], time.size)

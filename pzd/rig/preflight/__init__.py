@@ -23,7 +23,7 @@ from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
 from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics, remember_clean_displacement
-from pzd.signals.measures import reversals, work
+from pzd.signals.measures import one_record, reversals, work
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,12 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
     def examine(
         make: Callable[[], PreflightRecord],
     ) -> tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]:
-        test = make()
+        with one_record():
+            return examined_one(make())
+
+    def examined_one(
+        test: PreflightRecord,
+    ) -> tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]:
         record, run = test.record, test.cycles
         entry = RecordEntry(
             name=record.name,
