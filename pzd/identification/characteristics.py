@@ -53,7 +53,7 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record], job
             return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm
 
     places = [(condition, record) for condition in constant for record in condition.records]
-    found = list(zip(places, parallel_map(of_one, places, jobs), strict=True))
+    found = list(zip(places, parallel_map(of_one, places, jobs, first_here=True), strict=True))
     peaks = tuple(
         row
         for condition in constant

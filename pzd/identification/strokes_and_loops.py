@@ -289,7 +289,7 @@ def measures(records: Sequence[Record], jobs: int = 1) -> tuple[MeasureRow, ...]
         with one_record():
             return [_measures_row(test, constant) for test in (separate_tests(record) if constant else (record,))]
 
-    rows = [row for of_record in parallel_map(of_one, records, jobs) for row in of_record]
+    rows = [row for of_record in parallel_map(of_one, records, jobs, first_here=True) for row in of_record]
     alike = _SameTests(rows)
     return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, alike.to(row))}) for row in rows)
 

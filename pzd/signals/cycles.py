@@ -19,7 +19,7 @@ from pzd.signals.harmonics import MAINS
 from pzd.signals.measures import found_once, resolution, usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
 from pzd.signals.smoothing import HIGHEST, low_pass
-from pzd.signals.splines import cubic
+from pzd.signals.splines import cubic, integral
 
 FITTED_POINTS = 1000
 """Fewest points of a cycle in the fit of the period, as far as there are samples."""
@@ -360,16 +360,14 @@ def _repeating_span(time: Array, values: Array, period: float, span: Span, same:
 
 def _means_over_period_parts(time: Array, values: Array, period: float, span: Span) -> tuple[Array, int]:
     """Return the means of the values over equal parts of the period, and the number of parts in a cycle."""
-    from scipy.interpolate import CubicSpline
-
     step = usual_step(time)
     points = min(COMPARED_POINTS, max(int(period / step + 1e-6), 4))
     start, end = max(span[0], float(time[0])), min(span[1], float(time[-1]))
     width = period / points
-    bounds = start + np.arange(max(int((end - start) / width + 1e-6), 0) + 1) * width
+    parts = np.arange(max(int((end - start) / width + 1e-6), 0) + 1, dtype=np.float64)
+    bounds: Array = start + parts * width
     near = (time >= start - 8 * step) & (time <= end + 8 * step)
-    integral = CubicSpline(time[near], values[near]).antiderivative()
-    return np.asarray(np.diff(integral(bounds)) / width), points
+    return np.asarray(np.diff(integral(time[near], values[near])(bounds)) / width), points
 
 
 def _change_per_period(course: Array, points: int) -> Array:

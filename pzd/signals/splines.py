@@ -86,6 +86,42 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
     return at
 
 
+def integral(time: Array, values: Array) -> Callable[[Array], Array]:
+    """Return the integral of the cubic spline through samples (n,), from the first one on, as a function of time.
+
+    Equation: over the share u of a step, (w_0 c_{j-1} + w_1 c_j + w_2 c_{j+1} + w_3 c_{j+2})/6 with
+    w = (1 - (1 - u)^4)/4, 4 u - 2 u^3 + 3 u^4/4, u + 3 u^2/2 + u^3 - 3 u^4/4, u^4/4; see `even_cubic`
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing [s]
+    values : (n,)
+
+    Examples
+    --------
+    >>> integral(np.arange(6.0), np.arange(6.0) ** 3)(np.array([2.0, 4.5])).round(9).tolist()
+    [4.0, 102.515625]
+    """
+    if not is_even(time) or time.size < _FEWEST:
+        from scipy.interpolate import CubicSpline
+
+        whole: Callable[[Array], Array] = CubicSpline(time, values).antiderivative()
+        return whole
+    c, step = _coefficients(values, periodic=False), (time[-1] - time[0]) / (time.size - 1)
+    before = np.concatenate([[0.0], np.cumsum(c[:-3] + 11.0 * (c[1:-2] + c[2:-1]) + c[3:]) / 24.0])
+
+    def at(moments: Array) -> Array:
+        position = (moments - time[0]) / step
+        first = np.clip(np.floor(position), 0, time.size - 2)
+        u, k = position - first, first.astype(np.intp)
+        found = 0.25 * (1.0 - (1.0 - u) ** 4) * c[k] + 0.25 * u**4 * c[k + 3]
+        found += u * (4.0 - u**2 * (2.0 - 0.75 * u)) * c[k + 1]
+        found += u * (1.0 + u * (1.5 + u * (1.0 - 0.75 * u))) * c[k + 2]
+        return np.asarray(step * (before[k] + found / 6.0))
+
+    return at
+
+
 def even_derivatives(values: Array) -> tuple[Array, Array]:
     """Return first and second derivative of the cubic spline through even samples (n,), n >= 4, at the samples.
 

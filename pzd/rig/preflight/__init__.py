@@ -154,7 +154,7 @@ def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, prefligh
         remember_clean_displacement(record, clean)
         records.append(record)
 
-    results = [(entry, rows) for *_, entry, rows in parallel_map(examine, waiting, jobs, collected)]
+    results = [(entry, rows) for *_, entry, rows in parallel_map(examine, waiting, jobs, collected, first_here=True)]
     entries = tuple(entry for entry, _ in results)
     for family in families():
         for compare in getattr(family, "COMPARISONS", ()):
