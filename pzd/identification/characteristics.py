@@ -7,7 +7,7 @@ control signal and the force over a warm-up. Records without any of these get a 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,27 +27,44 @@ from pzd.artefacts.rig import same_motion
 from pzd.identification.intervals import label_columns
 from pzd.identification.moving_voltage import dwell_levels
 from pzd.identification.strokes_and_loops import Cycle, SpeedTest, Stroke, speed_tests, strokes_of
+from pzd.parallel.processes import parallel_map
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record
+from pzd.signals.measures import one_record
 from pzd.signals.segmentation import separate_tests
 
 
-def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> Characteristics:
+def characteristics(constant: Sequence[Condition], moving: Sequence[Record], jobs: int = 1) -> Characteristics:
     """Derive all characteristics of a rig.
 
     Parameters
     ----------
     constant : conditions, in each of which the control signal is constant
     moving : records in which it moves
+    jobs : records worked on at the same time
     """
-    found = [(condition, [(r, test) for r in condition.records for test in speed_tests(r)]) for condition in constant]
-    peaks = tuple(row for condition, tests in found for row in peak_velocity(condition, tests))
+
+    def of_one(
+        place: tuple[Condition, Record],
+    ) -> tuple[tuple[PeakVelocityRow, ...], tuple[ContinuousVelocityRow, ...], list[WarmUpRow]]:
+        condition, record = place
+        with one_record():
+            tests = [(record, test) for test in speed_tests(record)]
+            warm = [row for part in separate_tests(record) for row in _warm_up_rows(condition, record.name, part)]
+            return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm
+
+    places = [(condition, record) for condition in constant for record in condition.records]
+    found = list(zip(places, parallel_map(of_one, places, jobs, first_here=True), strict=True))
+    peaks = tuple(
+        row
+        for condition in constant
+        for row in _slowest_first(row for (mine, _), (rows, _, _) in found if mine is condition for row in rows)
+    )
     steps = tuple(row for record in moving for row in _step_rows(record))
-    tests = [(one, record.name, part) for one in constant for record in one.records for part in separate_tests(record)]
-    warm = tuple(row for test in tests for row in _warm_up_rows(*test))
+    warm = tuple(row for _, (_, _, rows) in found for row in rows)
     recognised = {row.record for rows in (peaks, steps, warm) for row in rows}
     return Characteristics(
         peak_velocity=peaks,
-        continuous_velocity=tuple(row for condition, tests in found for row in continuous_velocity(condition, tests)),
+        continuous_velocity=tuple(row for _, (_, rows, _) in found for row in rows),
         gas_and_friction=gas_and_friction(peaks),
         steps=steps,
         warm_up=warm,
@@ -66,7 +83,11 @@ def peak_velocity(condition: Condition, tests: Sequence[tuple[Record, SpeedTest]
     condition : whose labels the rows carry
     tests : of the condition's records, each with its record
     """
-    rows = [_peak_velocity_row(condition, record, test) for record, test in tests]
+    return _slowest_first(_peak_velocity_row(condition, record, test) for record, test in tests)
+
+
+def _slowest_first(rows: Iterable[PeakVelocityRow]) -> tuple[PeakVelocityRow, ...]:
+    """Return the rows of one condition in their order."""
     return tuple(sorted(rows, key=lambda row: (row.speed, row.record)))
 
 

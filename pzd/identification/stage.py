@@ -17,7 +17,7 @@ from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 log = logging.getLogger(__name__)
 
 WORTH_A_PROCESS = 2_000_000
-"""Fewest samples in all for which conditions are fitted in separate processes: each has to import its libraries."""
+"""Fewest samples in all for which conditions and records are worked on in separate processes, which have to start."""
 
 _VOLTAGE = Control()
 
@@ -39,7 +39,7 @@ def identify(
     seed : of the evolutionary search
     progress : called after every condition
     control : the control signal, which names the voltage in messages
-    jobs : conditions that are fitted at the same time
+    jobs : conditions that are fitted, and records that are described, at the same time
 
     Returns
     -------
@@ -53,6 +53,7 @@ def identify(
     from pzd.identification.characteristics import characteristics
     from pzd.identification.strokes_and_loops import measures
 
+    jobs = jobs if sum(record.time.size for record in rig.records) > WORTH_A_PROCESS else 1
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
     constant, moving = conditions(distinct(rig.records), identify.group.voltage_V, identify.group.temperature_degC)
@@ -69,9 +70,9 @@ def identify(
         knees = identify_knees(known, settings, identify, control, progress)
     return Identified(
         tuple(rows[labels] for labels in sorted(rows, key=_sort_key)),
-        measures(rig.records),
+        measures(rig.records, jobs),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_sort_key)),
-        characteristics(constant, moving),
+        characteristics(constant, moving, jobs),
         knees,
     )
 
@@ -145,8 +146,7 @@ def _constant_rows(
         rows.append((row, auxiliary))
         progress(Progress(len(rows), len(found), f"conditions: {_parameter_text(row)}{_auxiliary_text(auxiliary)}"))
 
-    samples = sum(record.time.size for condition in found for record in condition.records)
-    parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, collected)
+    parallel_map(fitted, range(len(found)), jobs, collected)
     return rows
 
 

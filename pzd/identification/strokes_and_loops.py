@@ -18,9 +18,10 @@ from pzd.artefacts import MeasureRow
 from pzd.artefacts.identified import Kind
 from pzd.artefacts.rig import SAME_MOTION, same_motion
 from pzd.identification.prepared_record import warm_up
+from pzd.parallel.processes import parallel_map
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles, cycles_of, settled_cycles
-from pzd.signals.measures import reversals, work
+from pzd.signals.measures import one_record, reversals, work
 from pzd.signals.segmentation import separate_tests
 
 # --- Strokes ---
@@ -89,7 +90,7 @@ class Stroke:
             inner = self.between(*MIDDLE_PART)
             force = _value_at_zero(self.displacement[inner] - self.middle, self.force[inner], 1)
             return float(np.polyfit(t - t[0], x, 1)[0]), force
-        course, half = self._course()
+        course, half = self._course
         fastest = _steepest_place(course)
         near = self._around_middle
         s = (self.time[near] - self.time[near][0]) / half - 1.0 - fastest
@@ -102,6 +103,7 @@ class Stroke:
         """Samples around mid-stroke."""
         return self.between(0.5 - 0.5 * AROUND_PEAK, 0.5 + 0.5 * AROUND_PEAK)
 
+    @cached_property
     def _course(self) -> tuple[np.polynomial.Polynomial, float]:
         """Return the displacement around mid-stroke [m] over time from -1 to 1, and half of that time [s]."""
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
@@ -110,7 +112,7 @@ class Stroke:
 
     def _has_one_peak(self) -> bool:
         """Tell whether the motion around mid-stroke is smooth, and fastest inside and not at its ends."""
-        course, half = self._course()
+        course, half = self._course
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
         left = x - course((t - t[0]) / half - 1.0)
         return bool(np.sqrt(np.mean(left**2)) <= SMOOTHNESS * self.length) and abs(_steepest_place(course)) < 1.0
@@ -275,13 +277,19 @@ CONSTANT_SPEED_SHARE = 0.5
 """Least share of the cycle in which a test of constant speed keeps it."""
 
 
-def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
-    """Compute the measures of every test, in the order of the records; each test of a record has a row of its name."""
+def measures(records: Sequence[Record], jobs: int = 1) -> tuple[MeasureRow, ...]:
+    """Compute the measures of every test, in the order of the records; each test of a record has a row of its name.
+
+    So many records are worked on at the same time.
+    """
     scale = voltage_scale(records)
-    still = [(record, is_constant(record, scale)) for record in records]
-    rows = [
-        _measures_row(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))
-    ]
+
+    def of_one(record: Record) -> list[MeasureRow]:
+        constant = is_constant(record, scale)
+        with one_record():
+            return [_measures_row(test, constant) for test in (separate_tests(record) if constant else (record,))]
+
+    rows = [row for of_record in parallel_map(of_one, records, jobs, first_here=True) for row in of_record]
     alike = _SameTests(rows)
     return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, alike.to(row))}) for row in rows)
 

@@ -373,21 +373,26 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     scale[scale == 0.0] = 1.0
     whole = size + sum(r.nuisances.shape[1] for r in records)
     normal, right = np.zeros((whole, whole)), np.zeros(whole)
-    columns, at = [], size
+    places, at = [], size
+
+    def columns(record: FittedRecord) -> Array:
+        return np.hstack([record.slopes / scale, record.nuisances])
+
     for record in records:
-        both = np.hstack([record.slopes / scale, record.nuisances])
-        place = np.r_[:size, at : at + record.nuisances.shape[1]]
-        weighed = both[record.calm] / np.sqrt(_noise_variance(record))
-        normal[np.ix_(place, place)] += weighed.T @ weighed
-        right[place] += weighed.T @ (record.residuals[record.calm] / np.sqrt(_noise_variance(record)))
-        columns.append((both, place))
+        both, place = columns(record), np.r_[:size, at : at + record.nuisances.shape[1]]
+        calm, noise = (slice(None) if record.calm.all() else record.calm), _noise_variance(record)
+        normal[np.ix_(place, place)] += both[calm].T @ both[calm] / noise
+        right[place] += both[calm].T @ record.residuals[calm] / noise
+        places.append(place)
         at += record.nuisances.shape[1]
     normal[np.diag_indices(whole)] += np.where(np.arange(whole) < size, 1e-12 * np.trace(normal), 1.0)
     triangle = np.linalg.cholesky(normal).T
     limit = np.where(np.arange(whole) < size, np.inf, NUISANCE_LIMIT)
     found = lsq_linear(triangle, np.linalg.solve(triangle.T, right), (-limit, limit)).x
+    # The columns of all records at a time would be the most that a fit of many keeps in memory.
     return [
-        _without_explained(record, both @ found[place]) for record, (both, place) in zip(records, columns, strict=True)
+        _without_explained(record, columns(record) @ found[place])
+        for record, place in zip(records, places, strict=True)
     ]
 
 

@@ -22,7 +22,12 @@ _FORKS = sys.platform == "linux"
 
 
 def parallel_map(
-    function: Callable[[Item], Made], items: Sequence[Item], jobs: int, made_one: Callable[[Made], None] | None = None
+    function: Callable[[Item], Made],
+    items: Sequence[Item],
+    jobs: int,
+    made_one: Callable[[Made], None] | None = None,
+    *,
+    first_here: bool = False,
 ) -> list[Made]:
     """Call a function with each item, in forked processes.
 
@@ -32,6 +37,8 @@ def parallel_map(
     items : its arguments
     jobs : processes at the same time; the results do not depend on it
     made_one : is called in this process with each result, in order
+    first_here : whether the first item is done in this process before the others part from it, so that they have what
+        it loads: for items that take less time than that
 
     Returns
     -------
@@ -54,9 +61,10 @@ def parallel_map(
         if made_one is not None:
             made_one(one)
 
-    if jobs < 2:
-        for item in items:
-            collect(function(item))
+    here = len(items) if jobs < 2 else int(first_here)
+    for item in items[:here]:
+        collect(function(item))
+    if here == len(items):
         return made
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
@@ -66,9 +74,9 @@ def parallel_map(
     pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
     finished = False
     try:
-        futures = [pool.submit(_one, place) for place in range(len(items))]
-        for future, item in zip(futures, items, strict=True):
-            collect(_result(future, function, item))
+        futures = [pool.submit(_one, place) for place in range(here, len(items))]
+        for place, future in enumerate(futures, here):
+            collect(_result(future, function, items[place]))
         finished = True
     finally:
         pool.shutdown(wait=finished, cancel_futures=True)

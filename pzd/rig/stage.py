@@ -41,7 +41,7 @@ def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1, prefli
 
     if rig.files is None:
         raise ConfigError("rig: this config has a virtual stand and no files; use synthesise (got rig.virtual)")
-    found = examined(read(rig.files, rig.limits, control, folder), jobs, preflight)
+    found = examined(read(rig.files, rig.limits, control, folder, jobs), jobs, preflight)
     log.info("read %d tests", len(found.records))
     return found
 

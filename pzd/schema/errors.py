@@ -19,6 +19,10 @@ class UserError(Exception):
         self.messages = (messages,) if isinstance(messages, str) else tuple(messages)
         super().__init__("\n".join(self.messages))
 
+    def __reduce__(self) -> tuple[type[Self], tuple[tuple[str, ...]]]:
+        """Keep the messages apart on the way to another process."""
+        return type(self), (self.messages,)
+
 
 class ConfigError(UserError):
     """A wrong config or a wrong use of a command."""
@@ -71,6 +75,10 @@ class Advised(str):
         made = super().__new__(cls, f"{fault} say {', or '.join(map(str, advice))}")
         made.fault, made.advice = fault, advice
         return made
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str | Advice, ...]]:
+        """Keep fault and advice apart on the way to another process."""
+        return type(self), (self.fault, *self.advice)
 
     def worded(self, how: Callable[[Advice], str | None]) -> str:
         """Return the message with each advice in other words; None where it says nothing elsewhere."""

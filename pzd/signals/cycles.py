@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from pzd.record import Array, Record
 from pzd.signals.harmonics import MAINS
-from pzd.signals.measures import resolution, usual_step
+from pzd.signals.measures import found_once, resolution, usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
 from pzd.signals.smoothing import HIGHEST, low_pass
-from pzd.signals.splines import cubic
+from pzd.signals.splines import cubic, integral
 
 FITTED_POINTS = 1000
 """Fewest points of a cycle in the fit of the period, as far as there are samples."""
@@ -84,6 +84,7 @@ class Cycles:
         """Return the number of samples in one cycle, rounded down: the length of a folded cycle."""
         return max(int(np.floor(self.period / usual_step(time) + 1e-6)), 4)
 
+    @found_once
     def fold(self, time: Array, values: Array) -> Array:
         """Interpolate values (n,) by a cubic spline at the points of the cycles, one row a cycle (count, points)."""
         instants = self.instants(time)
@@ -92,6 +93,7 @@ class Cycles:
         near = (time >= instants[0, 0] - reach) & (time <= instants[-1, -1] + reach)
         return cubic(time[near], values[near])(instants)
 
+    @found_once
     def instants(self, time: Array) -> Array:
         """Return the times (count, points) of the points of the cycles [s]."""
         points = self.points(time)
@@ -325,7 +327,7 @@ MEDIAN_OF_NORMAL = 0.6745
 def decimated_means(time: Array, values: Array, period: float, points: int) -> tuple[Array, Array]:
     """Thin a record to at least so many points a cycle and both its ends, each the mean of the samples around it."""
     every = max(int(period / usual_step(time)) // points, 1)
-    at = np.unique(np.append(np.arange(0, time.size, every), time.size - 1))
+    at = np.append(np.arange(0, time.size - 1, every), time.size - 1)
     reach = np.minimum(every // 2, np.minimum(at, time.size - 1 - at))
     sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
     return time[at], values[0] + (sums[at + reach + 1] - sums[at - reach]) / (2 * reach + 1)
@@ -358,16 +360,14 @@ def _repeating_span(time: Array, values: Array, period: float, span: Span, same:
 
 def _means_over_period_parts(time: Array, values: Array, period: float, span: Span) -> tuple[Array, int]:
     """Return the means of the values over equal parts of the period, and the number of parts in a cycle."""
-    from scipy.interpolate import CubicSpline
-
     step = usual_step(time)
     points = min(COMPARED_POINTS, max(int(period / step + 1e-6), 4))
     start, end = max(span[0], float(time[0])), min(span[1], float(time[-1]))
     width = period / points
-    bounds = start + np.arange(max(int((end - start) / width + 1e-6), 0) + 1) * width
+    parts = np.arange(max(int((end - start) / width + 1e-6), 0) + 1, dtype=np.float64)
+    bounds: Array = start + parts * width
     near = (time >= start - 8 * step) & (time <= end + 8 * step)
-    integral = CubicSpline(time[near], values[near]).antiderivative()
-    return np.asarray(np.diff(integral(bounds)) / width), points
+    return np.asarray(np.diff(integral(time[near], values[near])(bounds)) / width), points
 
 
 def _change_per_period(course: Array, points: int) -> Array:

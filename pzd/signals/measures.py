@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 from weakref import ref
 
 import numpy as np
 
-from pzd.record import Array
+from pzd.record import Array, running_median
 
 _last_clock: list[tuple[ref[Array], float]] = []
 """The last clock and its step: records are worked on one at a time, and a median is dear. Clocks are never modified."""
@@ -20,6 +25,56 @@ def usual_step(time: Array) -> float:
     step = float(np.median(np.diff(time)))
     _last_clock[:] = [(ref(time), step)]
     return step
+
+
+# --- What is found of a record once, and asked for by many ---
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_KEPT = 6
+"""Results of each function that are kept: those of the channels of one record."""
+_in_hand: ContextVar[dict[Any, Any] | None] = ContextVar("_in_hand", default=None)
+"""What was found so far, by function; None outside of `one_record`."""
+
+
+@contextmanager
+def one_record() -> Iterator[None]:
+    """Work on one record, none of whose arrays changes: what `found_once` finds of it is kept until this ends."""
+    if _in_hand.get() is not None:
+        yield
+        return
+    token = _in_hand.set({})
+    try:
+        yield
+    finally:
+        _in_hand.reset(token)
+
+
+def found_once(function: Callable[P, T]) -> Callable[P, T]:
+    """Ask a function only once what it makes of the same arrays, within `one_record`; nobody changes what it returns.
+
+    Outside it is asked each time: an array may hold other values by then.
+    """
+
+    @wraps(function)
+    def found(*given: P.args, **named: P.kwargs) -> T:
+        in_hand = _in_hand.get()
+        if in_hand is None:
+            return function(*given, **named)
+        known = in_hand.setdefault(function, {})
+        arguments = (*given, *named.items())
+        # The arrays are kept with what was made of them, so that no other takes the place of one.
+        key = tuple(id(one) if isinstance(one, np.ndarray) else one for one in arguments)
+        if key not in known:
+            made = function(*given, **named)
+            if len(known) == _KEPT:
+                known.pop(next(iter(known)))
+            known[key] = arguments, made
+        found_so: T = known[key][1]
+        return found_so
+
+    return found
 
 
 def rms(values: Array) -> float:
@@ -81,6 +136,7 @@ WHOLE_STEPS = 0.05
 """Largest median distance of the steps of a quantised channel from a whole number of the least one."""
 
 
+@found_once
 def resolution(values: Array) -> float:
     """Return the step in whole numbers of which a channel (n,) is recorded, in its unit; 0 where it has none."""
     steps = np.diff(np.unique(values))
@@ -93,6 +149,7 @@ REVERSAL_SHARE = 0.1
 """Least stroke between two reversals, as a share of the range: noise and the creep of a servo stay below it."""
 
 
+@found_once
 def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
     """Find the samples at which a motion reverses, each between strokes larger than a share of the range.
 
@@ -175,19 +232,21 @@ def chance_work(displacement: Array, force: Array, cycles: float | None = None) 
     return of_cycle * float(np.sqrt(1.0 + 0.5 * len(reversals(displacement)) if cycles is None else cycles))
 
 
+@found_once
 def slope(time: Array, x: Array) -> Array:
     """Compute the slope (n,) of a motion over four samples, insensitive to spikes of one or two."""
     if time.size < 6:
         return np.gradient(x, time)
     clean = despiked(x)
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
     span = np.maximum(time[4:] - time[:-4], 4.0 * step)
     return np.pad((clean[4:] - clean[:-4]) / span, 2, mode="edge")
 
 
+@found_once
 def despiked(x: Array) -> Array:
     """Return the running median (n,) of five samples."""
     if x.size < 5:
         return x
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
+    middle = running_median(x, 5)
     return np.concatenate((middle[:1], middle[:1], middle, middle[-1:], middle[-1:]))

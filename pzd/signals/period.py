@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.signals.measures import resolution, usual_step
 from pzd.signals.smoothing import HIGHEST, low_pass, without_steps
+from pzd.signals.splines import is_even
 
 MOST_SAMPLES = 2**18
 """Most samples in the search; longer records are thinned. An FFT of so many takes a few hundredths of a second."""
@@ -68,8 +69,11 @@ def periodic_section(time: Array, displacement: Array) -> PeriodicSection | None
     if last - first < 2 * LEAST_POINTS:
         return None
     step = max(usual_step(time), float(time[-1] - time[0]) / MOST_SAMPLES)
-    grid = np.arange(time[0], time[-1] + 0.5 * step, step)
-    x = np.interp(grid, time, displacement)
+    if time.size <= MOST_SAMPLES and is_even(time):
+        grid, x = time, displacement
+    else:
+        grid = np.arange(time[0], time[-1] + 0.5 * step, step)
+        x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
     smooth = low_pass(without_steps(x, resolution(displacement)), HIGHEST)  # the speed of a step is no motion
     # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
@@ -102,12 +106,14 @@ def mismatch(x: Array) -> Array:
     Equation: d(L) = var(x(t + L) - x(t)) / (var x(t) + var x(t + L)) over the overlap
               Source: de Cheveigne and Kawahara 2002 (YIN), with the mean of the difference taken off
     """
+    from scipy.fft import irfft, next_fast_len, rfft
+
     x = x - x.mean()
     lags = np.arange(x.size // 2 + 1)
     overlap = x.size - lags
-    size = 1 << int(np.ceil(np.log2(2 * x.size)))
-    spectrum = np.fft.rfft(x, size)
-    products = np.fft.irfft(np.abs(spectrum) ** 2, size)[lags] / overlap
+    size = next_fast_len(x.size + lags.size, real=True)  # what is wrapped round comes at longer lags
+    spectrum = rfft(x, size)
+    products = irfft(np.abs(spectrum) ** 2, size)[lags] / overlap
     sums, squares = np.concatenate(([0.0], np.cumsum(x))), np.concatenate(([0.0], np.cumsum(x * x)))
     early, late = sums[overlap] / overlap, (sums[-1] - sums[lags]) / overlap
     variance = squares[overlap] / overlap - early**2 + (squares[-1] - squares[lags]) / overlap - late**2

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from pzd.record import Array, Record, sliced
+from pzd.signals.measures import found_once
 
 LEAST_CYCLES = 3
 """Fewest equal cycles of a segment: two may be equal by chance in a beat."""
@@ -45,6 +46,7 @@ class Segment:
         return max(max(pair) / min(pair) for pair in pairs) - 1.0
 
 
+@found_once
 def steps_between_tests(time: Array, displacement: Array) -> tuple[tuple[Segment, Segment], ...]:
     """Find the steps from one test to the next without a pause, and return the segments on either side of each.
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.record import Array, Complex
+from pzd.signals.measures import found_once
 
 HIGHEST = 20.0
 """Highest corner of the smoothing [rad/sample]: it leaves a record without noise unchanged."""
@@ -28,6 +33,7 @@ _LONG = 131_072
 """Samples from which the memory and time of a transform matter."""
 
 
+@found_once
 def low_pass(values: Array, highest: float) -> Array:
     """Smooth a signal on a regular grid by a spline of the sixth order, its corner chosen by cross-validation.
 
@@ -43,10 +49,11 @@ def low_pass(values: Array, highest: float) -> Array:
     -------
     (n,) smoothed; the ends are continued by point reflection
     """
+    from scipy.fft import irfft
+
     line, spectrum, s = _reflected(values)
-    smooth: Array = np.fft.irfft(
-        spectrum / (1.0 + (s / _corner(s, np.abs(spectrum) ** 2, highest)) ** 6), 2 * (line.size - 1)
-    )[: values.size]
+    gain = 1.0 / (1.0 + (s / _corner(s, np.abs(spectrum) ** 2, highest)) ** 6)
+    smooth: Array = irfft(spectrum * gain, 2 * (line.size - 1))[: values.size]
     return smooth + line[: values.size]
 
 
@@ -62,13 +69,16 @@ def motion_below(values: Array) -> float:
 # noise, and its lines would count as motion.
 
 
+@found_once
 def without_steps(values: Array, step: float) -> Array:
     """Return a channel (n,) on a regular grid without the lines that hold no more than its steps add."""
     if step <= 0.0:
         return values
+    from scipy.fft import irfft
+
     line, spectrum, _ = _reflected(values)
     spectrum[_resolved_lines_of(spectrum, step) + 1 :] = 0.0
-    return np.asarray(np.fft.irfft(spectrum, 2 * (line.size - 1))[: values.size] + line[: values.size])
+    return np.asarray(irfft(spectrum, 2 * (line.size - 1))[: values.size] + line[: values.size])
 
 
 def resolved_below(values: Array, step: float) -> float:
@@ -109,12 +119,49 @@ def cut_above(displacement: Array, corner: float) -> tuple[Array, float]:
 
 
 def _reflected(values: Array) -> tuple[Array, Complex, Array]:
-    """Return the line (m,) through both ends, the spectrum (m,) of the reflected rest, and 2 sin(w/2) (m,); m >= n."""
+    """Return the line (m,) through both ends, the spectrum (m,) of the reflected rest, and 2 sin(w/2) (m,); m >= n.
+
+    By scipy, which takes half of numpy's time for a length of large prime factors.
+    """
+    from scipy.fft import rfft
+
     values = _of_fast_length(values)
     line = np.linspace(values[0], values[-1], values.size)
     flat = values - line
-    spectrum = np.fft.rfft(np.concatenate((flat, -flat[-2:0:-1])))
-    return line, spectrum, 2.0 * np.sin(np.pi * np.arange(spectrum.size) / (2 * (values.size - 1)))
+    return line, rfft(np.concatenate((flat, -flat[-2:0:-1]))), _sines(values.size)
+
+
+@lru_cache(maxsize=2)
+def _sines(size: int) -> Array:
+    """Return 2 sin(w/2) (size,) of the frequencies of a signal of so many samples, reflected."""
+    return np.asarray(2.0 * np.sin(np.pi * np.arange(size) / (2 * (size - 1))))
+
+
+class _Bands(NamedTuple):
+    """Bands of frequency in which a spectrum is summed, and what the filter takes of them."""
+
+    edges: NDArray[np.int64]
+    """(b,) first line of each."""
+    counts: Array
+    """(b,) lines of each."""
+    middle: Array
+    """(b,) mean 2 sin(w/2) of each."""
+    corners: Array
+    """(c,) corners [rad/sample]."""
+    taken: Array
+    """(c, b) share that each corner takes of each band."""
+
+
+@lru_cache(maxsize=2)
+def _bands(size: int, highest: float) -> _Bands:
+    """Return the bands of a spectrum (size,); records of one length follow one another."""
+    s = _sines(size)
+    edges = np.unique(np.geomspace(1, size, _BINS).astype(np.int64))
+    edges = edges[edges < size]
+    counts = np.diff(np.append(edges, size)).astype(np.float64)
+    middle = np.add.reduceat(s, edges) / counts
+    corners = np.geomspace(min(np.pi / size, highest), highest, _CORNERS)
+    return _Bands(edges, counts, middle, corners, 1.0 / (1.0 + np.outer(corners**6, middle**-6.0)))
 
 
 def _of_fast_length(values: Array) -> Array:
@@ -138,24 +185,20 @@ def _corner(s: Array, power: Array, highest: float) -> float:
     below would count as motion. So bands from 0 to a half, a quarter, an eighth ... of the range are examined too, and
     the lowest corner is taken above which no line exceeds the noise of its band and the total power is faint.
     """
-    edges = np.unique(np.geomspace(1, s.size, _BINS).astype(np.int64))
-    edges = edges[edges < s.size]
-    binned, counts = np.add.reduceat(power, edges), np.diff(np.append(edges, s.size))
-    middle = np.add.reduceat(s, edges) / counts
-    corners = np.geomspace(min(np.pi / s.size, highest), highest, _CORNERS)
-    taken = 1.0 / (1.0 + np.outer(corners**6, middle**-6.0))
+    edges, counts, middle, corners, taken = _bands(s.size, float(highest))
+    binned = np.add.reduceat(power, edges)
     found = float(corners[_least_score(taken, binned, counts)])
     for halvings in range(1, _HALVINGS + 1):
         limit = s[-1] / 2.0**halvings
-        inside = middle <= limit
-        if np.count_nonzero(s <= limit) < _FEWEST:
+        inside, last = int(np.searchsorted(middle, limit, "right")), int(np.searchsorted(s, limit, "right"))
+        if last < _FEWEST:
             break
-        corner = float(corners[_least_score(taken[:, inside], binned[inside], counts[inside])])
-        noise = (s > CLEAR * corner) & (s <= limit)
-        if np.count_nonzero(noise) < _FEWEST:
+        corner = float(corners[_least_score(taken[:, :inside], binned[:inside], counts[:inside])])
+        first = int(np.searchsorted(s, CLEAR * corner, "right"))
+        if last - first < _FEWEST:
             continue
-        level = float(np.mean(power[noise]))
-        above = power[s > CLEAR * corner]
+        level = float(np.mean(power[first:last]))
+        above = power[first:]
         even = float(np.max(above)) <= _STANDS_OUT * np.log(above.size) * level
         if even and float(np.sum(above)) <= _FAINT * float(np.sum(power)):
             found = min(found, corner)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pzd.record import Array
+from pzd.signals.measures import found_once
 
 _ROOT = float(np.sqrt(3.0)) - 2.0
 """Root of z^2 + 4 z + 1: what an end of the samples adds to the coefficients dies away with its powers."""
@@ -35,6 +36,7 @@ def cubic(time: Array, values: Array) -> Callable[[Array], Array]:
     return lambda moments: course((moments - time[0]) / step)
 
 
+@found_once
 def is_even(time: Array) -> bool:
     """Whether samples (n,), n >= 2, lie on an even clock."""
     clock = np.linspace(time[0], time[-1], time.size)
@@ -80,6 +82,42 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
         found += (4.0 - 3.0 * rest**2 * (1.0 + share)) * c[k + 2]
         found += share**3 * c[k + 3]
         return np.asarray(found / 6.0)
+
+    return at
+
+
+def integral(time: Array, values: Array) -> Callable[[Array], Array]:
+    """Return the integral of the cubic spline through samples (n,), from the first one on, as a function of time.
+
+    Equation: over the share u of a step, (w_0 c_{j-1} + w_1 c_j + w_2 c_{j+1} + w_3 c_{j+2})/6 with
+    w = (1 - (1 - u)^4)/4, 4 u - 2 u^3 + 3 u^4/4, u + 3 u^2/2 + u^3 - 3 u^4/4, u^4/4; see `even_cubic`
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing [s]
+    values : (n,)
+
+    Examples
+    --------
+    >>> integral(np.arange(6.0), np.arange(6.0) ** 3)(np.array([2.0, 4.5])).round(9).tolist()
+    [4.0, 102.515625]
+    """
+    if not is_even(time) or time.size < _FEWEST:
+        from scipy.interpolate import CubicSpline
+
+        whole: Callable[[Array], Array] = CubicSpline(time, values).antiderivative()
+        return whole
+    c, step = _coefficients(values, periodic=False), (time[-1] - time[0]) / (time.size - 1)
+    before = np.concatenate([[0.0], np.cumsum(c[:-3] + 11.0 * (c[1:-2] + c[2:-1]) + c[3:]) / 24.0])
+
+    def at(moments: Array) -> Array:
+        position = (moments - time[0]) / step
+        first = np.clip(np.floor(position), 0, time.size - 2)
+        u, k = position - first, first.astype(np.intp)
+        found = 0.25 * (1.0 - (1.0 - u) ** 4) * c[k] + 0.25 * u**4 * c[k + 3]
+        found += u * (4.0 - u**2 * (2.0 - 0.75 * u)) * c[k + 1]
+        found += u * (1.0 + u * (1.5 + u * (1.0 - 0.75 * u))) * c[k + 2]
+        return np.asarray(step * (before[k] + found / 6.0))
 
     return at
 

@@ -26,6 +26,20 @@ def test_results_stand_in_order_for_any_number_of_processes(jobs: int, count: in
     assert parallel_map(lambda number: number**2, range(count), jobs) == [number**2 for number in range(count)]
 
 
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+@pytest.mark.parametrize("count", [0, 1, 2, 7])
+def test_what_the_first_item_loads_all_others_have_where_it_is_done_here(jobs: int, count: int) -> None:
+    loaded: list[int] = []
+
+    def load(number: int) -> tuple[int, int]:
+        if not loaded:
+            loaded.append(os.getpid())
+        return number, loaded[0]
+
+    found = parallel_map(load, range(count), jobs, first_here=True)
+    assert found == [(number, os.getpid()) for number in range(count)]
+
+
 @pytest.mark.parametrize("jobs", [1, 3])
 def test_each_that_is_made_is_reported_in_order_where_it_was_asked_for(jobs: int) -> None:
     told: list[tuple[int, int]] = []

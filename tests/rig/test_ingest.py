@@ -15,8 +15,10 @@ from pzd.artefacts import Rig
 from pzd.damper.element import element_force
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
+from pzd.rig.stage import ingest
 from pzd.rig.stand.config import VirtualEntry
 from pzd.rig.stand.recording import run_campaign
+from pzd.schema.errors import Advised, DataError
 
 
 def test_canonical_columns_need_nothing_but_the_path(tmp_path: Path) -> None:
@@ -27,6 +29,30 @@ def test_canonical_columns_need_nothing_but_the_path(tmp_path: Path) -> None:
     assert np.abs(record.velocity - V).max() < 1e-5 * np.abs(V).max()
     assert record.temperature is None
     assert record.median_voltage() == 100.0
+
+
+def test_two_processes_read_what_one_reads_and_refuse_it_in_the_same_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.rig.files.reading.WORTH_A_PROCESS", 0)
+    for name in "abc":
+        write(tmp_path / f"{name}.csv", lines(CANONICAL | {"force_N": FORCE * (1.0 + ord(name))}))
+    config = RigConfig.model_validate_json(json.dumps({"files": [{"path": "*.csv"}]}))
+    one, two = (ingest(config, Control(), tmp_path, jobs) for jobs in (1, 2))
+    assert one.entries == two.entries
+    for alone, beside in zip(one.records, two.records, strict=True):
+        assert all(np.array_equal(getattr(alone, f.name), getattr(beside, f.name)) for f in fields(alone)[2:8])
+    write(tmp_path / "b.csv", lines(CANONICAL | {"time_s": np.arange(TIME.size)}))  # told with advice
+    write(tmp_path / "c.csv", ["time_s,displacement_m,force_N", "0,1", "1,2,x"])
+    told = []
+    for jobs in (1, 2):
+        with pytest.raises(DataError) as caught:
+            ingest(config, Control(), tmp_path, jobs)
+        told.append(caught.value.messages)
+    assert told[0] == told[1]
+    assert len(told[0]) == 2
+    advised = [next(m for m in messages if isinstance(m, Advised)) for messages in told]
+    assert advised[0].advice == advised[1].advice
 
 
 @pytest.mark.parametrize(("separator", "decimal"), [(";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", ".")])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pzd.signals.splines import cubic, even_cubic, even_derivatives
+from pzd.signals.splines import cubic, even_cubic, even_derivatives, integral
 
 ROUNDING = 1e-13
 """Of the largest value."""
@@ -64,3 +64,13 @@ def test_samples_that_are_not_even_are_taken_where_they_lie(jitter: float, rng: 
     values, at = rng.standard_normal(200), rng.uniform(time[0], time[-1], 50)
     expected = CubicSpline(time, values)(at)
     assert cubic(time, values)(at) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("samples", [3, 4, 5, 40, 700])
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_the_integral_is_that_of_the_spline(samples: int, jitter: float, rng: np.random.Generator) -> None:
+    time = 3.0 + 1e-3 * (np.arange(samples) + jitter * rng.uniform(-1.0, 1.0, samples))
+    values = rng.standard_normal(samples)
+    moments = np.concatenate([time, rng.uniform(time[0] - 1e-3, time[-1] + 1e-3, 3 * samples)])
+    expected = CubicSpline(time, values).antiderivative()(moments)
+    assert np.max(np.abs(integral(time, values)(moments) - expected)) <= 1e-12 * np.max(np.abs(expected))

@@ -8,8 +8,8 @@ Nothing here changes a record.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
@@ -23,7 +23,7 @@ from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
 from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics, remember_clean_displacement
-from pzd.signals.measures import reversals, work
+from pzd.signals.measures import one_record, reversals, work
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +96,12 @@ def findings(test: PreflightRecord) -> tuple[Finding, ...]:
     return (*test.remarks, *(finding for check in checks().values() for finding in check(test)))
 
 
-def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, preflight: bool = True) -> Rig:
+def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, preflight: bool = True) -> Rig:
     """Make and examine every record.
 
     Parameters
     ----------
-    tests : each makes one record
+    tests : each makes one record, and is let go then where nobody else keeps it
     jobs : records made and examined at the same time
     preflight : whether they are examined; an entry has no findings otherwise
 
@@ -111,9 +111,16 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
     """
 
     def examine(
-        make: Callable[[], PreflightRecord],
+        make: Callable[[], PreflightRecord] | None,
     ) -> tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]:
-        test = make()
+        if make is None:
+            raise ValueError("this record was made already")
+        with one_record():
+            return examined_one(make())
+
+    def examined_one(
+        test: PreflightRecord,
+    ) -> tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]:
         record, run = test.record, test.cycles
         entry = RecordEntry(
             name=record.name,
@@ -133,13 +140,23 @@ def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, prefligh
         )
         return record, run, test.clean.displacement, entry, test.ingested
 
-    results = parallel_map(examine, tests, jobs)
-    # Records were made in other processes, whose memory of the cycles and the clean motion is lost here.
-    for record, cycles, clean, _, _ in results:
-        remember_cycles(record, cycles)
+    waiting: list[Callable[[], PreflightRecord] | None] = list(tests)
+    del tests
+    records: list[Record] = []
+
+    def collected(made: tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]) -> None:
+        record, run, clean, _, _ = made
+        waiting[len(records)] = None
+        if records and np.array_equal(record.time, records[-1].time):
+            record = replace(record, time=records[-1].time)  # most tests of a rig have one clock: it is kept once
+        # A record was made in another process, whose memory of the cycles and the clean motion is lost here.
+        remember_cycles(record, run)
         remember_clean_displacement(record, clean)
-    entries = tuple(entry for *_, entry, _ in results)
+        records.append(record)
+
+    results = [(entry, rows) for *_, entry, rows in parallel_map(examine, waiting, jobs, collected, first_here=True)]
+    entries = tuple(entry for entry, _ in results)
     for family in families():
         for compare in getattr(family, "COMPARISONS", ()):
             entries = compare(entries)
-    return Rig(tuple(record for record, *_ in results), entries, tuple(row for *_, rows in results for row in rows))
+    return Rig(tuple(records), entries, tuple(row for _, rows in results for row in rows))

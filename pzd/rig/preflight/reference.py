@@ -89,6 +89,13 @@ class Section:
         """Return what the channel of the force shows of (m, n) forces."""
         return rows if self.passed is None else self.passed(rows)
 
+    @cached_property
+    def free(self) -> Array:
+        """Orthonormal columns (s, 3) of offset, spring and inertia, of the samples that count."""
+        x = self.displacement
+        rows = self.recorded(np.stack([np.ones(x.size), x, _bend(x)]))
+        return np.asarray(np.linalg.qr(self.counted(rows).T)[0])
+
 
 @dataclass(frozen=True)
 class ReferenceFit:
@@ -190,8 +197,7 @@ def fit_element(
     zooms : how often the grid becomes finer
     start : T0 / k [m] and C / k [s] about which is searched alone; None for everywhere
     """
-    free = _free_terms(section)
-    rest = _projected_out(section.counted(forces), free)
+    rest = _projected_out(section.counted(forces), section.free)
     targets = _normalised(rest)
     unexplained: Array = np.sum(rest**2, axis=1) / section.squares
 
@@ -253,7 +259,7 @@ def _grid(section: Section, spans: Sequence[tuple[float, float]], counts: tuple[
     """Elements between the logarithms of two values each."""
     frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
     pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
-    forces = _projected_out(section.counted(section.recorded(_unit_forces(section, pairs))), _free_terms(section))
+    forces = _projected_out(section.counted(section.recorded(_unit_forces(section, pairs))), section.free)
     return _Grid(pairs, (float(frictions[1] - frictions[0]), float(lags[1] - lags[0])), _normalised(forces))
 
 
@@ -267,13 +273,6 @@ def _unit_forces(section: Section, pairs: Sequence[tuple[float, float]]) -> Arra
 
 def _bend(x: Array) -> Array:
     return np.asarray(np.gradient(np.gradient(x)))
-
-
-def _free_terms(section: Section) -> Array:
-    """Orthonormal columns (s, 3) of offset, spring and inertia, of the samples that count."""
-    x = section.displacement
-    rows = section.recorded(np.stack([np.ones(x.size), x, _bend(x)]))
-    return np.asarray(np.linalg.qr(section.counted(rows).T)[0])
 
 
 def _projected_out(forces: Array, free: Array) -> Array:
