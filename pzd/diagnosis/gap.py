@@ -76,8 +76,8 @@ def check_residual(
     # The mains nearly repeat from cycle to cycle, as a gap does.
     mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
-    variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) + unresolved_turns(given.damper, record.displacement) == 0.0
+    variance = _difference_variance(prepared, without, mask, calm)
     force, shifted = record.force - mains, _shifted(prepared, predicted)
 
     def explained_with(late: Array) -> Array:
@@ -186,11 +186,18 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
 
-def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
-    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
-    folded = _folded(prepared, residual, mask)
-    steps = np.diff(residual[mask]) if folded is None else np.diff(folded, axis=0)
-    return float(np.mean(steps**2) / 2.0)
+def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask, calm: Mask) -> float:
+    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances.
+
+    Those beside a jump tell in which sample it fell: as noise, they would hide what the test has of its own.
+    """
+    folded, beside = _folded(prepared, residual, mask), _folded(prepared, np.asarray(~calm, dtype=np.float64), mask)
+    if folded is None or beside is None:
+        steps, counted = np.diff(residual[mask]), (calm[mask])[1:] & (calm[mask])[:-1]
+    else:
+        steps, counted = np.diff(folded, axis=0), np.broadcast_to(beside.max(axis=0) == 0.0, folded[1:].shape)
+    counted = counted if np.any(counted) else np.ones(counted.shape, dtype=np.bool_)
+    return float(np.mean(steps[counted] ** 2) / 2.0)
 
 
 def _trend_power(folded: Array, error: PureError) -> float:

@@ -2,9 +2,9 @@
 
 Noise of the displacement goes through a stiff oil into the force, and its second derivative looks like inertia. Where
 the motion repeats, cycles are averaged, and only harmonics well above their own scatter are kept, over the whole cycle
-or in short parts of it, such as the corners of a triangle. Steps that each cycle meets alike do not scatter: of harmonics
-beyond which there is no more than the steps add, the first ones are as large as a drive may distort its motion, with
-what the steps leave unknown of them, and the others are no motion.
+or in short parts of it, such as the corners of a triangle. Steps that each cycle meets alike do not scatter: of the
+harmonics beyond which there is no more than the steps add, the first are as large as a drive may distort its motion,
+with what the steps leave unknown of them, and the others are no motion.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class AverageCycle:
 
     @cached_property
     def distortion(self) -> tuple[NDArray[np.complex128], Array]:
-        """(H + 1,) harmonics that a drive may have added among those that steps hide [m], and the power unknown of them.
+        """(H + 1,) harmonics that a drive may have added where steps hide them [m], and the power unknown of them.
 
         A harmonic that steps know worse than the drive makes it is none, and all its power is unknown.
 
@@ -129,7 +129,7 @@ class AverageCycle:
 
     @cached_property
     def left_out(self) -> Array:
-        """(H + 1,) power of the motion in what is not kept: that of neighbouring harmonics above noise, or the drive's."""
+        """(H + 1,) power of the motion in what is not kept: of neighbouring harmonics above noise, or of the drive."""
         drawn = [self._noise(draw) for draw in np.random.default_rng(LEFT_OUT_DRAWS).spawn(LEFT_OUT_DRAWS)]
         noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
         counted = ~self.clear & (np.arange(noise.size) < self.resolved)

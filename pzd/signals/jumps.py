@@ -28,7 +28,7 @@ MAD_TO_SIGMA = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
 
-def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
+def jumps(force: Array, most: int = MOST_SUDDEN, *, closed: bool = False) -> Array:
     """Find the samples beside jumps of the force, as by dry friction at a reversal.
 
     Equation: |F_(i-1) - 2 F_i + F_(i+1)| where it exceeds 6 of its robust standard deviations
@@ -38,13 +38,16 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     ----------
     force : (n,) [N]
     most : largest number of samples
+    closed : whether the last sample is followed by the first, as in an average cycle
 
     Returns
     -------
     (n,) magnitude of the second difference at these samples [N]; 0 at all others
     """
-    bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
-    bend[[0, -1]] = 0.0
+    around = np.pad(force, 1, mode="wrap" if closed else "edge")
+    bend = np.abs(np.convolve(around, (1.0, -2.0, 1.0), "valid"))
+    if not closed:
+        bend[[0, -1]] = 0.0
     sudden = np.flatnonzero(bend > SUDDEN * MAD_TO_SIGMA * np.median(bend))
     largest = sudden[np.argsort(-bend[sudden], kind="stable")][:most]
     found = np.zeros(force.size)
@@ -66,7 +69,7 @@ def jumps_in_samples(measured: Array, predicted: Array, turns: int = 0) -> Array
 
 def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     """Find the samples beside jumps of a periodic record from its average cycle, which has little noise; as `jumps`."""
-    cycle = jumps(run.mean(time, force))
+    cycle = jumps(run.mean(time, force), closed=True)
     place = run.phase(time) * cycle.size
     before = np.floor(place).astype(np.int64) % cycle.size
     return np.asarray(np.maximum(cycle[before], cycle[(before + 1) % cycle.size]))

@@ -513,7 +513,7 @@ def with_nuisances(
     found = replace(bare, delay_s=nuisance.delay_s)
     for _ in range(2):  # the second with the force where the likeliest delay puts it
         force = delayed(found.first_delay)
-        bends = jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)
+        bends = jumps(bare.measured, closed=True) if averaged else jumps_in_samples(bare.measured, force)
         columns = np.column_stack(
             [
                 np.full(force.size, nuisance.offset * bare.peak),

@@ -222,7 +222,7 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     points = prepared.draws[0].time.size // 2
     known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
     turns = unresolved_turns(damper, prepared.draws[0].displacement[points:], closed=True)
-    calm = np.maximum(jumps(known), turns) == 0.0
+    calm = np.maximum(jumps(known, closed=True), turns) == 0.0
     changes = np.fft.rfft((np.stack(others) - known) * calm, points, axis=1) / points
     power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     power[0] = 0.0  # a stuck damper keeps whatever offset it began with
