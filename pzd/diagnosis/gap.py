@@ -186,16 +186,22 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
 
+OUT_OF_REACH = 0.01
+"""Share of a sample in a point of a folded cycle up to which the point counts as apart from it: a hundredth of a jump,
+which is small beside noise wherever friction does not hide all else. Not tuned."""
+
+
 def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask, calm: Mask) -> float:
     """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances.
 
     Those beside a jump tell in which sample it fell: as noise, they would hide what the test has of its own.
     """
-    folded, beside = _folded(prepared, residual, mask), _folded(prepared, np.asarray(~calm, dtype=np.float64), mask)
+    folded, beside = _folded(prepared, residual, mask), _folded(prepared, np.where(calm, 0.0, 1.0), mask)
     if folded is None or beside is None:
-        steps, counted = np.diff(residual[mask]), (calm[mask])[1:] & (calm[mask])[:-1]
+        steps, counted = np.diff(residual[mask]), calm[mask][1:] & calm[mask][:-1]
     else:
-        steps, counted = np.diff(folded, axis=0), np.broadcast_to(beside.max(axis=0) == 0.0, folded[1:].shape)
+        shares = np.abs(beside).max(axis=0)  # the spline of a fold reaches a few samples beyond
+        steps, counted = np.diff(folded, axis=0), np.broadcast_to(shares < OUT_OF_REACH, folded[1:].shape)
     counted = counted if np.any(counted) else np.ones(counted.shape, dtype=np.bool_)
     return float(np.mean(steps[counted] ** 2) / 2.0)
 
