@@ -537,7 +537,7 @@ def with_nuisances(
             [
                 np.full(force.size, nuisance.offset * bare.peak),
                 nuisance.gain * force,
-                _jump_columns(_with_ringing(np.maximum(bends, turns)) if averaged else np.maximum(bends, turns)),
+                _jump_columns(_with_ringing(np.maximum(bends, turns))),
                 *([] if timing is None else [timing]),
             ]
         )
