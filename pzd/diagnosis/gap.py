@@ -88,7 +88,7 @@ def check_residual(
             (late[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask),
         )
         size[mask], timing[mask] = nuisance_forces(left, *own)
-        near_jumps = _nuisance_near_jumps(force, late, size, timing)
+        near_jumps = _nuisance_near_jumps(force, late, size, timing, closed=run is not None)
         return late - predicted + np.where(mask & ~calm, near_jumps, size + timing)
 
     ways = [explained_with(predicted)]
@@ -106,12 +106,21 @@ def check_residual(
 
 
 def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]:
-    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump."""
+    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump.
+
+    Beyond either end the motion goes on as it did a cycle before or after, where it repeats; else it rests.
+    """
     from scipy.interpolate import Akima1DInterpolator
 
-    time = prepared.record.time
+    time, period = prepared.record.time, 0.0 if prepared.cycles is None else prepared.cycles.period
     course = Akima1DInterpolator(time, force, method="makima")
-    return lambda delay: np.asarray(course(np.clip(time - delay, time[0], time[-1]))) if delay else force
+
+    def late(delay: float) -> Array:
+        moments = time - delay
+        moments = moments + period * (moments < time[0]) - period * (moments > time[-1])
+        return np.asarray(course(np.clip(moments, time[0], time[-1])))
+
+    return lambda delay: late(delay) if delay else force
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
@@ -122,16 +131,17 @@ def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
     return jumps_in_cycles(run, record.time, record.force)
 
 
-def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array) -> Array:
+def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array, *, closed: bool) -> Array:
     """Compute the (n,) part explained by a test and chance near a jump [N]: where its parts leave less, with them.
 
     Parameters
     ----------
     force, predicted : (n,) [N]
     size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
+    closed : whether these are whole cycles
     """
     parts = np.zeros(size.size), size, size + timing
-    found = np.stack([part + jump_timing_error(force - part, predicted) for part in parts])
+    found = np.stack([part + jump_timing_error(force - part, predicted, closed=closed) for part in parts])
     least = np.argmin(np.abs(force - predicted - found), axis=0)
     return np.asarray(np.take_along_axis(found, least[np.newaxis], axis=0)[0])
 

@@ -7,6 +7,7 @@ chance. Where samples are left out, nothing is differenced across the gap.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -157,7 +158,7 @@ def beside_unresolved_reversals(displacement: Array, travel: float, *, closed: b
     return found
 
 
-def jump_timing_error(measured: Array, predicted: Array) -> Array:
+def jump_timing_error(measured: Array, predicted: Array, *, closed: bool = False) -> Array:
     """Compute the part (n,) of the residual that a jump up to one sample earlier or later than predicted explains [N].
 
     Only where the record jumps as well, by half of the predicted change from one sample to the next: a flank that it
@@ -167,16 +168,17 @@ def jump_timing_error(measured: Array, predicted: Array) -> Array:
     ----------
     measured : (n,) force [N]
     predicted : (n,) force [N]
+    closed : whether the last sample is followed by the first, as in whole cycles
     """
-    around, beside = (_neighbours(force) for force in (predicted, measured))
+    around, beside = (_neighbours(force, "wrap" if closed else "edge") for force in (predicted, measured))
     low, high = around.min(axis=0), around.max(axis=0)
     step = np.abs(np.diff(beside, axis=0)).max(axis=0)
     return np.asarray(np.where(step >= 0.5 * (high - low), np.clip(measured, low, high) - predicted, 0.0))
 
 
-def _neighbours(force: Array) -> Array:
-    """Return the force one sample before, at, and after each sample (3, n)."""
-    padded = np.pad(force, 1, mode="edge")
+def _neighbours(force: Array, beyond: Literal["edge", "wrap"]) -> Array:
+    """Return the force one sample before, at, and after each sample (3, n), with the ends continued."""
+    padded = np.pad(force, 1, mode=beyond)
     return np.stack([padded[:-2], force, padded[2:]])
 
 
