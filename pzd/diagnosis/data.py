@@ -59,6 +59,10 @@ class PreparedRecord:
     draws: tuple[Record, ...] = ()
     """Two cycles of the lead, or the whole record where nothing repeats; and the same with other displacements, as
     likely within noise and resolution."""
+    average: AverageCycle | None = None
+    """Average cycle of the displacement, where it repeats."""
+    read_alike: int = 1
+    """Tests of the rig, this one among them, in which the steps of the displacement err alike."""
 
     @cached_property
     def folded(self) -> Array:
@@ -100,8 +104,11 @@ def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
     """Clean every record of one rig; several tests in one record become several records of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
+    found = [_prepared(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))]
+    averages = [p.average for p in found if p.average is not None]
     return tuple(
-        _prepared(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))
+        p if p.average is None else replace(p, read_alike=max(sum(map(p.average.read_alike, averages)), 1))
+        for p in found
     )
 
 
@@ -123,7 +130,7 @@ def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     step = 1.0 / record.rate
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
     lead = _with_lead(cleaned, early, motion(early))
-    return PreparedRecord(cleaned, run, lead, constant, _monte_carlo_motions(lead, average))
+    return PreparedRecord(cleaned, run, lead, constant, _monte_carlo_motions(lead, average), average)
 
 
 def _denoised(record: Record, *, constant: bool) -> Record:

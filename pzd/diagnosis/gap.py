@@ -76,8 +76,8 @@ def check_residual(
     # The mains nearly repeat from cycle to cycle, as a gap does.
     mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
-    variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) + unresolved_turns(given.damper, record.displacement) == 0.0
+    variance = _difference_variance(prepared, without, mask, calm)
     force, shifted = record.force - mains, _shifted(prepared, predicted)
 
     def explained_with(late: Array) -> Array:
@@ -88,7 +88,7 @@ def check_residual(
             (late[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask),
         )
         size[mask], timing[mask] = nuisance_forces(left, *own)
-        near_jumps = _nuisance_near_jumps(force, late, size, timing)
+        near_jumps = _nuisance_near_jumps(force, late, size, timing, closed=run is not None)
         return late - predicted + np.where(mask & ~calm, near_jumps, size + timing)
 
     ways = [explained_with(predicted)]
@@ -106,12 +106,21 @@ def check_residual(
 
 
 def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]:
-    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump."""
+    """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump.
+
+    Beyond either end the motion goes on as it did a cycle before or after, where it repeats; else it rests.
+    """
     from scipy.interpolate import Akima1DInterpolator
 
-    time = prepared.record.time
+    time, period = prepared.record.time, 0.0 if prepared.cycles is None else prepared.cycles.period
     course = Akima1DInterpolator(time, force, method="makima")
-    return lambda delay: np.asarray(course(np.clip(time - delay, time[0], time[-1]))) if delay else force
+
+    def late(delay: float) -> Array:
+        moments = time - delay
+        moments = moments + period * (moments < time[0]) - period * (moments > time[-1])
+        return np.asarray(course(np.clip(moments, time[0], time[-1])))
+
+    return lambda delay: late(delay) if delay else force
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
@@ -122,16 +131,17 @@ def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
     return jumps_in_cycles(run, record.time, record.force)
 
 
-def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array) -> Array:
+def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array, *, closed: bool) -> Array:
     """Compute the (n,) part explained by a test and chance near a jump [N]: where its parts leave less, with them.
 
     Parameters
     ----------
     force, predicted : (n,) [N]
     size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
+    closed : whether these are whole cycles
     """
     parts = np.zeros(size.size), size, size + timing
-    found = np.stack([part + jump_timing_error(force - part, predicted) for part in parts])
+    found = np.stack([part + jump_timing_error(force - part, predicted, closed=closed) for part in parts])
     least = np.argmin(np.abs(force - predicted - found), axis=0)
     return np.asarray(np.take_along_axis(found, least[np.newaxis], axis=0)[0])
 
@@ -186,11 +196,24 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
 
-def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
-    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
-    folded = _folded(prepared, residual, mask)
-    steps = np.diff(residual[mask]) if folded is None else np.diff(folded, axis=0)
-    return float(np.mean(steps**2) / 2.0)
+OUT_OF_REACH = 0.01
+"""Share of a sample in a point of a folded cycle up to which the point counts as apart from it: a hundredth of a jump,
+which is small beside noise wherever friction does not hide all else. Not tuned."""
+
+
+def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask, calm: Mask) -> float:
+    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances.
+
+    Those beside a jump tell in which sample it fell: as noise, they would hide what the test has of its own.
+    """
+    folded, beside = _folded(prepared, residual, mask), _folded(prepared, np.where(calm, 0.0, 1.0), mask)
+    if folded is None or beside is None:
+        steps, counted = np.diff(residual[mask]), calm[mask][1:] & calm[mask][:-1]
+    else:
+        shares = np.abs(beside).max(axis=0)  # the spline of a fold reaches a few samples beyond
+        steps, counted = np.diff(folded, axis=0), np.broadcast_to(shares < OUT_OF_REACH, folded[1:].shape)
+    counted = counted if np.any(counted) else np.ones(counted.shape, dtype=np.bool_)
+    return float(np.mean(steps[counted] ** 2) / 2.0)
 
 
 def _trend_power(folded: Array, error: PureError) -> float:

@@ -7,6 +7,7 @@ chance. Where samples are left out, nothing is differenced across the gap.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -28,7 +29,7 @@ MAD_TO_SIGMA = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
 
-def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
+def jumps(force: Array, most: int = MOST_SUDDEN, *, closed: bool = False) -> Array:
     """Find the samples beside jumps of the force, as by dry friction at a reversal.
 
     Equation: |F_(i-1) - 2 F_i + F_(i+1)| where it exceeds 6 of its robust standard deviations
@@ -38,13 +39,16 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     ----------
     force : (n,) [N]
     most : largest number of samples
+    closed : whether the last sample is followed by the first, as in an average cycle
 
     Returns
     -------
     (n,) magnitude of the second difference at these samples [N]; 0 at all others
     """
-    bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
-    bend[[0, -1]] = 0.0
+    around = np.pad(force, 1, mode="wrap" if closed else "edge")
+    bend = np.abs(np.convolve(around, (1.0, -2.0, 1.0), "valid"))
+    if not closed:
+        bend[[0, -1]] = 0.0
     sudden = np.flatnonzero(bend > SUDDEN * MAD_TO_SIGMA * np.median(bend))
     largest = sudden[np.argsort(-bend[sudden], kind="stable")][:most]
     found = np.zeros(force.size)
@@ -66,7 +70,7 @@ def jumps_in_samples(measured: Array, predicted: Array, turns: int = 0) -> Array
 
 def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     """Find the samples beside jumps of a periodic record from its average cycle, which has little noise; as `jumps`."""
-    cycle = jumps(run.mean(time, force))
+    cycle = jumps(run.mean(time, force), closed=True)
     place = run.phase(time) * cycle.size
     before = np.floor(place).astype(np.int64) % cycle.size
     return np.asarray(np.maximum(cycle[before], cycle[(before + 1) % cycle.size]))
@@ -154,7 +158,7 @@ def beside_unresolved_reversals(displacement: Array, travel: float, *, closed: b
     return found
 
 
-def jump_timing_error(measured: Array, predicted: Array) -> Array:
+def jump_timing_error(measured: Array, predicted: Array, *, closed: bool = False) -> Array:
     """Compute the part (n,) of the residual that a jump up to one sample earlier or later than predicted explains [N].
 
     Only where the record jumps as well, by half of the predicted change from one sample to the next: a flank that it
@@ -164,16 +168,17 @@ def jump_timing_error(measured: Array, predicted: Array) -> Array:
     ----------
     measured : (n,) force [N]
     predicted : (n,) force [N]
+    closed : whether the last sample is followed by the first, as in whole cycles
     """
-    around, beside = (_neighbours(force) for force in (predicted, measured))
+    around, beside = (_neighbours(force, "wrap" if closed else "edge") for force in (predicted, measured))
     low, high = around.min(axis=0), around.max(axis=0)
     step = np.abs(np.diff(beside, axis=0)).max(axis=0)
     return np.asarray(np.where(step >= 0.5 * (high - low), np.clip(measured, low, high) - predicted, 0.0))
 
 
-def _neighbours(force: Array) -> Array:
-    """Return the force one sample before, at, and after each sample (3, n)."""
-    padded = np.pad(force, 1, mode="edge")
+def _neighbours(force: Array, beyond: Literal["edge", "wrap"]) -> Array:
+    """Return the force one sample before, at, and after each sample (3, n), with the ends continued."""
+    padded = np.pad(force, 1, mode=beyond)
     return np.stack([padded[:-2], force, padded[2:]])
 
 

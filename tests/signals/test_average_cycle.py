@@ -39,12 +39,33 @@ def test_harmonics_that_do_not_exceed_their_scatter_are_dropped(rng: Generator) 
 
 @pytest.mark.parametrize("samples", [1000, 977])
 def test_steps_that_each_cycle_meets_alike_are_no_motion(samples: int) -> None:
-    """They do not scatter at all; a hundred steps a stroke, and a speed to a thousandth of its peak."""
+    """They do not scatter at all; a hundred steps a stroke, and a speed to a hundredth of its peak.
+
+    As recorded, it would be off by more than the peak. A drive may distort the motion by as much as the first harmonics
+    of the steps, so that these are believed: up to the ninth, (sum h^2)^(1/2) of 2.3e-4 each, or 0.8 %.
+    """
     time = np.arange(8 * samples) / samples
     x, v = np.sin(2.0 * np.pi * time + 0.3), 2.0 * np.pi * np.cos(2.0 * np.pi * time + 0.3)
     seen = 0.02 * np.round(x / 0.02)
     average = AverageCycle.of(time, seen, Cycles(1.0, 0.0, 8))
-    assert np.max(np.abs(average.motion(average.clear_harmonics)(time)[1] - v)) < 1e-3 * np.max(v)
+    assert np.max(np.abs(average.motion(average.clear_harmonics)(time)[1] - v)) < 1e-2 * np.max(v)
+
+
+def test_what_a_drive_adds_below_the_steps_is_known_as_far_as_they_let_it(rng: Generator) -> None:
+    """A third harmonic of 0.25 % under steps of 4 %: its error is that which is stated, and never a sure nothing."""
+    points, stroke, errors, stated = 400, 4e-3, [], []
+    time = np.arange(6 * points) / points
+    for _ in range(40):
+        phase, step = rng.uniform(0.0, 2.0 * np.pi), stroke * rng.uniform(0.02, 0.06)
+        x = stroke * np.sin(2.0 * np.pi * time) + 2.5e-3 * stroke * np.sin(6.0 * np.pi * time + phase)
+        zero = step * rng.uniform(-0.5, 0.5)
+        average = AverageCycle.of(time, step * np.round((x + zero) / step) - zero, Cycles(1.0, 0.0, 6))
+        true = np.fft.rfft(x[:points])[3] / points
+        draws = [average.error(np.random.default_rng(i))[3] for i in range(50)]
+        errors.append(abs(average.clear_harmonics[3] - true) ** 2)
+        stated.append(np.mean(np.abs(draws) ** 2))
+    assert 0.3 < np.mean(np.array(errors) / np.array(stated)) < 2.0
+    assert np.sqrt(np.mean(errors)) < 0.6 * 1.25e-3 * stroke
 
 
 def test_the_step_of_a_channel_is_that_of_its_values_now() -> None:

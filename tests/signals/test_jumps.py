@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.jumps import beside_unresolved_reversals
+from pzd.signals.jumps import beside_unresolved_reversals, jumps
 
 AMPLITUDE, FREQUENCY, RATE = 0.02, 2.3, 100.0
 
@@ -40,3 +40,12 @@ def test_a_cycle_reverses_over_its_ends_too() -> None:
     cycle = AMPLITUDE * np.cos(2.0 * np.pi * (np.arange(43) + 0.3) / 43.0)
     assert beside_unresolved_reversals(cycle, 0.0, closed=True)[[0, -1]].all()
     assert not beside_unresolved_reversals(cycle, 0.0)[[0, -1]].any()
+
+
+@pytest.mark.parametrize("shift", range(0, 100, 7))
+def test_a_jump_is_found_wherever_a_cycle_is_cut_open(shift: int) -> None:
+    """A cycle that begins at a reversal jumps between its last sample and its first."""
+    phase = 2.0 * np.pi * np.arange(100) / 100.0
+    force = np.roll(np.sign(np.cos(phase + 0.01)) + 0.1 * np.cos(phase), shift)
+    found = np.flatnonzero(jumps(force, closed=True))
+    assert set((found - shift) % 100) == {24, 25, 74, 75}

@@ -257,6 +257,12 @@ class WeightedRecord:
             return found
         return np.asarray(found - np.outer(own, own @ found) * ((1.0 - 1.0 / np.sqrt(1.0 + square)) / square))
 
+    def delay_among_jumps(self, at: Callable[[float], Array]) -> float:
+        """Find the delay [s] of least misfit among `DELAYS_TRIED`; see `likeliest_delay`."""
+        shares = np.linspace(-LARGEST_DELAY, LARGEST_DELAY, DELAYS_TRIED)
+        left = self.standardised(np.column_stack([self.measured - at(share * self.delay_s) for share in shares]))
+        return float(self.delay_s * shares[np.argmin(np.sum(left**2, axis=0) + shares**2)])
+
     def likeliest_delay(self, at: Callable[[float], Array]) -> float:
         """Find the likeliest delay [s] of a force at the compared samples, a function of it, by Gauss and Newton."""
         delay = self.first_delay
@@ -318,6 +324,9 @@ SHIFTS = 12
 """Most steps in which the likeliest delay of a test is found, each along the slope of the force.
 
 Reason: a jump of dry friction goes by a sample or two a step."""
+DELAYS_TRIED = 31
+"""Delays from which that search begins where the force jumps, over all that the limit admits: a fifth of a standard
+deviation apart, which is less than a sample up to 10 kHz. Along the slope alone it ends at the nearest jump."""
 SAME_DELAY = 1e-4
 """Change of the delay at which its search ends [standard deviations]: the misfit changes by its square."""
 DISCREPANCY = 0.3
@@ -345,6 +354,12 @@ FEWEST_SAMPLES = 2 * CYCLE_POINTS
 """Fewest samples of a motion that does not repeat.
 
 Reason: fewer do not show the spectrum of their noise."""
+FORGOTTEN = 1e-3
+"""Share of the error of the first force that may be left where a cycle begins.
+
+Reason: offset and gain of the test, a hundredth of the peak, are then below `RESOLUTION`."""
+MOST_LEAD = 8
+"""Half cycles in front of a cycle, at most: an element that remembers longer is a spring."""
 MOST_POINTS = 2048
 """Largest number of points of a cycle: the compared harmonics need no finer grid, however slow the test.
 
@@ -407,7 +422,10 @@ def _from_cycles(
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
-    motion, lead, factor = _cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion])
+    slowest = max(row.C_Ns_per_m / row.k_N_per_m for row in given.damper.base)
+    halves = int(np.clip(np.ceil(-np.log(FORGOTTEN) * slowest / (0.5 * run.period)), 1, MOST_LEAD))
+    channels = [_resampled(channel, points) for channel in p.mean_motion]
+    motion, lead, factor = _cycle_motion(record, run.period, channels, halves)
     bare = WeightedRecord(
         record.name,
         base_row,
@@ -436,13 +454,14 @@ def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: fl
     return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
 
 
-def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
-    """Return a cycle of the mean motion, with half a cycle in front to settle, on a grid fine enough to simulate."""
+def _cycle_motion(record: Record, period: float, channels: Sequence[Array], halves: int) -> tuple[Motion, int, int]:
+    """Return a cycle of the mean motion, with half cycles in front to settle, on a grid fine enough to simulate."""
     points = channels[0].size
     factor = int(np.ceil(CYCLE_POINTS / points))
     fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
-    lead = points // 2 * factor  # it holds a reversal, after which the element has forgotten how it began
-    led = np.concatenate([fine[:, -lead:], fine], axis=1)
+    # Each half holds a reversal, after which a friction has forgotten how it began; a spring forgets by C/k.
+    lead = halves * (points // 2) * factor
+    led = np.concatenate([np.tile(fine, halves)[:, -lead:], fine], axis=1)
     count = led.shape[1]
     time: Array = np.arange(count, dtype=np.float64) * (period / (points * factor))
     temperature = record.median_temperature()
@@ -524,17 +543,19 @@ def with_nuisances(
     found = replace(bare, delay_s=nuisance.delay_s)
     for _ in range(2):  # the second with the force where the likeliest delay puts it
         force = delayed(found.first_delay)
-        bends = jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)
+        bends = jumps(bare.measured, closed=True) if averaged else jumps_in_samples(bare.measured, force)
         columns = np.column_stack(
             [
                 np.full(force.size, nuisance.offset * bare.peak),
                 nuisance.gain * force,
-                _jump_columns(np.maximum(bends, turns)),
+                _jump_columns(_with_ringing(np.maximum(bends, turns))),
                 *([] if timing is None else [timing]),
             ]
         )
         found = replace(found, nuisances=MarginalisedNuisances.from_columns(bare.standardised(columns)))
         if nuisance.delay_s > 0.0:
+            if np.any(bends) or np.any(turns):
+                found = replace(found, first_delay=found.delay_among_jumps(delayed))
             found = replace(found, first_delay=found.likeliest_delay(delayed))
     return found
 
@@ -560,6 +581,26 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
     weights[0] /= np.sqrt(2.0)
     nothing = MarginalisedNuisances.none(2 * weights.size - 1)
     return replace(weighed, weights=weights, nuisances=nothing, delay_s=0.0)
+
+
+RINGING = 2.0 - np.sqrt(3.0)
+"""Share by which a cubic spline through equidistant samples rings less from one sample to the next.
+
+Reason: root of z^2 + 4 z + 1 = 0, which its equations of continuity have between two jumps (de Boor 1978, ch. IV)."""
+RINGING_SAMPLES = 5
+"""Samples over which it rings: 1/700 of a jump is left then."""
+
+
+def _with_ringing(bends: Array) -> Array:
+    """Return the (n,) bends near jumps of an average cycle with what splines make of them at the samples around [N].
+
+    Cycles are folded by splines, and a delayed force is read from one.
+    """
+    found = bends
+    for away in range(1, RINGING_SAMPLES + 1):
+        beside = np.maximum(np.roll(bends, away), np.roll(bends, -away))
+        found = np.maximum(found, RINGING**away * beside)
+    return found
 
 
 def _jump_columns(bends: Array) -> Array:

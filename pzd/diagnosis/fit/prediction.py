@@ -203,7 +203,10 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
 
     What they change beside a jump is its instant, which is left to chance in any case.
 
-    Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
+    Steps that err alike in n tests give n of them the same error: each counts n times, so that all of them together
+    know no more than one.
+
+    Equation: s_h^2 = n mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
 
     Parameters
     ----------
@@ -219,9 +222,9 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     points = prepared.draws[0].time.size // 2
     known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
     turns = unresolved_turns(damper, prepared.draws[0].displacement[points:], closed=True)
-    calm = np.maximum(jumps(known), turns) == 0.0
+    calm = np.maximum(jumps(known, closed=True), turns) == 0.0
     changes = np.fft.rfft((np.stack(others) - known) * calm, points, axis=1) / points
-    power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
+    power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     power[0] = 0.0  # a stuck damper keeps whatever offset it began with
     width = np.ones(2 * NEIGHBOURS + 1)
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
