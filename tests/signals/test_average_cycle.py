@@ -61,7 +61,7 @@ def test_what_a_drive_adds_below_the_steps_is_known_as_far_as_they_let_it(rng: G
         zero = step * rng.uniform(-0.5, 0.5)
         average = AverageCycle.of(time, step * np.round((x + zero) / step) - zero, Cycles(1.0, 0.0, 6))
         true = np.fft.rfft(x[:points])[3] / points
-        draws = [average.error(np.random.default_rng(i))[3] for i in range(50)]
+        draws = [average.error(rng)[3] for _ in range(50)]
         errors.append(abs(average.clear_harmonics[3] - true) ** 2)
         stated.append(np.mean(np.abs(draws) ** 2))
     assert 0.3 < np.mean(np.array(errors) / np.array(stated)) < 2.0
