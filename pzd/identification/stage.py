@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
+from pzd.artefacts import AuxiliaryRow, Characteristics, Identified, Knees, ParameterRow, Rig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
@@ -29,6 +29,7 @@ def identify(
     progress: Listener = no_listener,
     control: Control = _VOLTAGE,
     jobs: int = 1,
+    described: bool = True,
 ) -> Identified:
     """Identify the Bingham parameters of every condition of every setting, with intervals and status.
 
@@ -40,6 +41,7 @@ def identify(
     progress : called after every condition
     control : the control signal, which names the voltage in messages
     jobs : conditions that are fitted, and records that are described, at the same time
+    described : whether the tests are described without a model as well, which changes no parameter
 
     Returns
     -------
@@ -70,9 +72,9 @@ def identify(
         knees = identify_knees(known, settings, identify, control, progress)
     return Identified(
         tuple(rows[labels] for labels in sorted(rows, key=_sort_key)),
-        measures(rig.records, jobs),
+        measures(rig.records, jobs) if described else (),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_sort_key)),
-        characteristics(constant, moving, jobs),
+        characteristics(constant, moving, jobs) if described else Characteristics(),
         knees,
     )
 

@@ -135,7 +135,7 @@ class Pipeline:
         if name == "setting":
             return self.setting()
         given = {"seed": self.config.seed, "folder": self.run.config.parent}
-        return (given | {"jobs": self.jobs, "progress": self.progress, "preflight": True})[name]
+        return (given | {"jobs": self.jobs, "progress": self.progress, "preflight": True, "described": True})[name]
 
     def setting(self) -> str | None:
         """Return the setting in use, by the config and the records of the run."""
@@ -214,6 +214,8 @@ class InMemory(Pipeline):
 
     artefacts: dict[str, Artefact] = field(default_factory=dict)
     """By folder."""
+    described: bool = True
+    """Whether the tests are described without a model too, for who looks at more than the parameters."""
 
     def through(self, last: str) -> Mapping[str, Artefact]:
         """Every artefact up to a stage, by its folder; those that are known already are not made again."""
@@ -235,7 +237,8 @@ class InMemory(Pipeline):
 
     def _argument(self, name: str, annotation: Any) -> Any:
         """Return what a parameter of a stage is given."""
-        return False if name == "preflight" else super()._argument(name, annotation)
+        own = {"preflight": False, "described": self.described}
+        return own[name] if name in own else super()._argument(name, annotation)
 
     def setting(self) -> str | None:
         """Return the setting in use."""

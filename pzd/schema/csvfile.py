@@ -193,14 +193,15 @@ def _validated_rows(
     """
     rows: list[tuple[int, Row]] = []
     faults: list[str] = []
+    fields = model.model_fields
+    columns = [(name, fields[name].is_required() or not defaults, _reader(fields[name].annotation)) for name in names]
     for number, cells in lines:
         if len(cells) != len(names):
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(names)}")
             continue
-        given = [(name, model.model_fields[name], cell) for name, cell in zip(names, cells, strict=True)]
-        taken = [(name, field, cell) for name, field, cell in given if cell or field.is_required() or not defaults]
+        given = zip(columns, cells, strict=True)
         try:
-            row = model.model_validate({name: _typed(cell, field.annotation) for name, field, cell in taken})
+            row = model.model_validate({name: read(cell) for (name, always, read), cell in given if cell or always})
             rows.append((number, row))
         except ValidationError as error:
             for detail in error.errors():
@@ -364,17 +365,32 @@ def _refuse(path: Path, faults: Sequence[str]) -> None:
         raise DataError([*faults[:_MOST_FAULTS], *([f"{at(path)}: and {more} more such faults"] if more > 0 else [])])
 
 
-def _typed(cell: str, annotation: Any) -> str | float | None:
-    """Read a cell: None where it is empty and may be, a number where the field takes one, else its text."""
+def _reader(annotation: Any) -> Callable[[str], str | float | None]:
+    """Return what reads the cells of a field: None where one is empty and may be, a number where it takes one, or text.
+
+    One for each column: a file of thousands of rows asks ten thousands of cells.
+    """
     kinds = {annotation, *get_args(annotation)}
-    if not cell:
-        return None if NoneType in kinds else cell
-    if str in kinds:
-        cell = _restored(cell)
+    empty = None if NoneType in kinds else ""
+    takes_text = str in kinds
     takes_numbers = not kinds.isdisjoint({int, float}) or any(isinstance(kind, int) for kind in kinds)
-    if not takes_numbers or not _is_number(cell):
-        return cell
-    return int(cell) if cell.lstrip("+-").isdecimal() else float(cell)
+
+    def read(cell: str) -> str | float | None:
+        if not cell:
+            return empty
+        if takes_text:
+            cell = _restored(cell)
+        if not takes_numbers:
+            return cell
+        try:
+            value = float(cell)
+        except ValueError:
+            return cell
+        if not math.isfinite(value) or "_" in cell:
+            return cell
+        return int(cell) if cell.lstrip("+-").isdecimal() else value
+
+    return read
 
 
 # --- Parquet files, where a CSV would be large; they need pyarrow, an extra ---

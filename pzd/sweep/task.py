@@ -314,7 +314,7 @@ def _rows(base: BaseRun, task: Task) -> Iterator[dict[str, Scalar]]:
     if task.damper:  # another damper: what lies behind diagnose is made anew
         shared = tuple(stage for stage in shared if stage.name not in ("table", "simulate", "report"))
     read = {stage.folder: _read(base, stage.folder) for stage in shared}
-    chain = InMemory(config, given.run, stages(config), lambda _: None, artefacts=read)
+    chain = InMemory(config, given.run, stages(config), lambda _: None, artefacts=read, described=False)
     if sweep.until == "simulate":
         chain.through("diagnose")
         chain.artefacts[Diagnosed.folder] = scattered(chain.of(Diagnosed), sweep.damper, dict(task.damper))

@@ -41,6 +41,15 @@ def test_records_of_one_condition_share_a_row_and_settings_do_not() -> None:
     assert found.untrusted(Control()) == ()
 
 
+def test_parameters_are_the_same_where_nobody_asks_what_the_tests_show_without_a_model() -> None:
+    whole, alone = identify(IdentifyConfig(), rig(), seed=1), identify(IdentifyConfig(), rig(), seed=1, described=False)
+    assert alone.rows == whole.rows
+    assert alone.auxiliary == whole.auxiliary
+    assert whole.characteristics.peak_velocity
+    assert not alone.characteristics.peak_velocity
+    assert not alone.measures
+
+
 def test_conditions_fitted_in_processes_of_their_own_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[Progress] = []
     alone = identify(IdentifyConfig(), rig(), seed=1, progress=told.append)

@@ -10,6 +10,7 @@ so that they hold on an idle machine alone. No figure decides anything but what 
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -52,7 +53,12 @@ def main() -> None:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         known = parts(Path(name))
-        for part in sys.argv[1:] or known:
+        parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        parser.add_argument("part", nargs="*", help=f"{', '.join(known)}; none for all")
+        asked = parser.parse_args().part
+        if unknown := set(asked) - set(known):
+            parser.error(f"there is {', '.join(known)} (got {', '.join(sorted(unknown))})")
+        for part in asked or known:
             begun = time.perf_counter()
             for row in known[part]():
                 row.say()
