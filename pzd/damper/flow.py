@@ -151,7 +151,10 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
     if force <= 0.0:
         return 0.0
     low, high, friction = 0.0, force, p[T0] * kernels.direction_factor(side, p)
-    s = viscous_force(guess, p, side)
+    if guess > 0.0 and smooth_rise(guess, p, side) < 2.0:  # the rest changes less by the speed than s does
+        s = force - kernels.yield_force(guess, friction, p) - kernels.extra_force(guess, p)
+    else:
+        s = viscous_force(guess, p, side)
     if not low < s < high:
         s = 0.5 * high
     for _ in range(_NEWTON_STEPS):
@@ -162,7 +165,9 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
         else:
             low = s
         following = s - miss / smooth_rise(w, p, side)
-        if abs(following - s) <= _NEWTON_TOLERANCE * s or abs(miss) <= _ROUNDING * force:
+        if abs(miss) <= _ROUNDING * force:
+            return w
+        if abs(following - s) <= _NEWTON_TOLERANCE * s:
             return viscous_speed(min(max(following, low), high), p, side)
         if not low < following < high:
             following = 0.5 * (low + high)
