@@ -14,6 +14,7 @@ from pzd.damper.compiled.kernels import T0, C, Row
 
 _NEWTON_STEPS = 60  # bisection alone needs 53 for all digits of a double
 _NEWTON_TOLERANCE = 1e-13  # of the unknown: a few times its rounding
+_ROUNDING = 1e-15  # of the force: what a search may leave, which no step makes smaller
 _NO_FRICTION = 1e-6
 """Breakaway force [N] that counts as none: within the rounding of a force its two edges would be one, and a search that
 ends at T0 = 0 comes as near as 1e-12."""
@@ -132,10 +133,10 @@ def _searched_speed(force: float, p: Row, side: float, guess: float) -> float:
         else:
             low = w
         following = w - miss / smooth_slope(w, p, side)
+        if abs(following - w) <= _NEWTON_TOLERANCE * w or abs(miss) <= _ROUNDING * force:
+            return min(max(following, low), high)  # of the bracket it may be the very end
         if not low < following < high:
             following = 0.5 * (low + high)
-        if abs(following - w) <= _NEWTON_TOLERANCE * w:
-            return following
         w = following
     return w
 
@@ -150,7 +151,10 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
     if force <= 0.0:
         return 0.0
     low, high, friction = 0.0, force, p[T0] * kernels.direction_factor(side, p)
-    s = viscous_force(guess, p, side)
+    if guess > 0.0 and smooth_rise(guess, p, side) < 2.0:  # the rest changes less by the speed than s does
+        s = force - kernels.yield_force(guess, friction, p) - kernels.extra_force(guess, p)
+    else:
+        s = viscous_force(guess, p, side)
     if not low < s < high:
         s = 0.5 * high
     for _ in range(_NEWTON_STEPS):
@@ -161,10 +165,12 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
         else:
             low = s
         following = s - miss / smooth_rise(w, p, side)
+        if abs(miss) <= _ROUNDING * force:
+            return w
+        if abs(following - s) <= _NEWTON_TOLERANCE * s:
+            return viscous_speed(min(max(following, low), high), p, side)
         if not low < following < high:
             following = 0.5 * (low + high)
-        if abs(following - s) <= _NEWTON_TOLERANCE * s:
-            return viscous_speed(following, p, side)
         s = following
     return viscous_speed(s, p, side)
 

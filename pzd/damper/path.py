@@ -415,13 +415,16 @@ def _w_derivatives(
         return
     rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
     found[0] = p[K] * stroke_slope(e, side, p) / rise
-    pull, curve = side * p[K] * stroke_law(e, side, p), _curve(w, p, regime, side)
+    pull, edge = side * p[K] * stroke_law(e, side, p), 0.0
+    if regime == RELIEF:
+        edge = smooth_speed(relief(p, side), p, side, w)
+    curve = _curve(w, p, edge, regime, side)
     for c in range(v.columns.size):
         q = nudged(p, v.columns[c], v.nudges[c])
         if K <= v.columns[c] < FLOW:
             change = side * q[K] * stroke_law(e, side, q) - pull
         else:
-            change = curve - _curve(w, q, regime, side)
+            change = curve - _curve(w, q, edge, regime, side)
         v.partial[c] = -side * change / (rise * v.nudges[c])
         if v.columns[c] == K:
             v.partial[c] *= -p[K] * p[K]  # by 1/k
@@ -430,11 +433,21 @@ def _w_derivatives(
 
 
 @inlined
-def _curve(w: float, p: Row, regime: int, side: float) -> float:
-    """Compute the force [N] at a flow speed [m/s] by the law of a regime, also beyond its edge."""
+def _curve(w: float, p: Row, edge: float, regime: int, side: float) -> float:
+    """Compute the force [N] at a flow speed [m/s] by the law of a regime, also beyond its edge.
+
+    Parameters
+    ----------
+    w : the flow speed
+    p : parameter row
+    edge : flow speed at which the relief valve opens, that of a row which differs by a nudge at most: a step of
+        Newton's method takes it to this row's [m/s]
+    regime, side : see `pzd.damper.regimes`
+    """
     if regime == RELIEF:
-        edge = relief(p, side)
-        return edge + relief_slope(p, side) * (w - smooth_speed(edge, p, side, w))
+        opens = relief(p, side)
+        edge -= (smooth_force(edge, p, side) - opens) / smooth_slope(edge, p, side)
+        return opens + relief_slope(p, side) * (w - edge)
     return smooth_force(w, p, side)
 
 
