@@ -483,7 +483,9 @@ class Findings:
         covariance = self.search.regression.covariance(best)
         slopes = self._slopes(best)
         unnamed = self._hides(self.search.left(best), slopes)
-        missed = self._missed_of_response(best, slopes) * best.values
+        # Of a coordinate that is a logarithm of the whole size, not of its change, the error is the share itself.
+        whole_sizes = np.array([c.logarithmic and c.absent for c in best.coordinates])
+        missed = self._missed_of_response(best, slopes) * np.where(whole_sizes, 1.0, best.values)
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
