@@ -688,6 +688,11 @@ class Findings:
         told.append(
             f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"
         )
+        told.extend(
+            f"{counted(out, 'test')} of {state.name} left out: the control signal moves, or no cycle repeats"
+            for state in (self.before, self.after)
+            if (out := len(state.prepared) - len(averaged(state.prepared)))
+        )
         return "; ".join(told)
 
     def cycles(self) -> tuple[ComparedCycle, ...]:
