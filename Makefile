@@ -73,7 +73,7 @@ bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that 
 	$(BIN)/python tests/studies/bench.py
 
 .PHONY: changes-study
-changes-study: $(DEV)  ## Print how often `pzd changes` is right, on pairs of virtual dampers; ten minutes
+changes-study: $(DEV)  ## Print how often `pzd changes` is right, on pairs of virtual dampers; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 40
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 20 --kind stand
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/changes_study.py --pairs 20 --kind same

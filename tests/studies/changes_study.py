@@ -35,6 +35,7 @@ from pzd.blind.independent.kernel import BinghamTable
 from pzd.blind.independent.laws import LAWS, Scale
 from pzd.blind.independent.outside import OUTSIDE
 from pzd.blind.rates import Rate
+from pzd.damper.effects import library
 from pzd.diagnosis.changes.comparison import changes_between, changes_between_rigs
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import DiagnoseConfig
@@ -47,6 +48,8 @@ CAMPAIGNS = ("two_by_two", "constant_stroke", "sines_and_triangles")
 ELEMENT = ("T0", "C", "k")
 NEW = ("asymmetry", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic", "preload_offset", "relief_valve",
        "rounded_yield", "shear_thinning", "stribeck_friction")  # fmt: skip
+ADDITIVE = ("fluid_inertia", "gas_spring", "orifice_quadratic", "preload_offset")
+"""Laws of one size in proportion to which the force is."""
 SIZES = (0.005, 0.05)
 """Least and largest change of the force (r.m.s.), as a share of peak."""
 STAND = ("load_cell_zero", "load_cell_gain", "recorder_delay")
@@ -179,7 +182,10 @@ def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def held(found: Changes, drawn: Pair) -> Iterator[bool]:
-    """Yield of each named truth whether the interval of `to` holds the true change, `from` held."""
+    """Yield of each named truth whether the interval of `to` holds the true change, `from` held.
+
+    A law that stands beside one that the first state was found to have is counted where their sizes add up.
+    """
     for c in found.changes:
         given = drawn.changed.get(c.name, {})
         if "factor" in given:
@@ -187,7 +193,10 @@ def held(found: Changes, drawn: Pair) -> Iterator[bool]:
             own = np.interp(c.at_voltage_V or (drawn.base.values[0],), drawn.base.values, getattr(drawn.base, c.name))
             yield from ((low <= (true := _moved(c.name, start, own, given["factor"]))) & (true <= high)).tolist()
         elif c.parameter in given and isinstance(c.low95, float) and isinstance(c.high95, float):
-            yield c.low95 <= given[c.parameter] <= c.high95
+            before = c.from_ if isinstance(c.from_, float) else 0.0
+            absent = before == 0.0 or before == library()[c.name].parameter(c.parameter).neutral
+            if absent or c.name in ADDITIVE:
+                yield c.low95 <= given[c.parameter] + (0.0 if absent else before) <= c.high95
 
 
 def _moved(name: str, start: Array, own: Array, factor: float) -> Array:

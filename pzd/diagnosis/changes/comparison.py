@@ -483,7 +483,9 @@ class Findings:
         covariance = self.search.regression.covariance(best)
         slopes = self._slopes(best)
         unnamed = self._hides(self.search.left(best), slopes)
-        missed = self._missed_of_response(best, slopes) * best.values
+        # Of a coordinate that is a logarithm of the whole size, not of its change, the error is the share itself.
+        whole_sizes = np.array([c.logarithmic and c.absent for c in best.coordinates])
+        missed = self._missed_of_response(best, slopes) * np.where(whole_sizes, 1.0, best.values)
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
@@ -685,6 +687,11 @@ class Findings:
         pairs = sum(c.before is not None for c in self.comparisons)
         told.append(
             f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"
+        )
+        told.extend(
+            f"{counted(out, 'test')} of {state.name} left out: the control signal moves, or no cycle repeats"
+            for state in (self.before, self.after)
+            if (out := len(state.prepared) - len(averaged(state.prepared)))
         )
         return "; ".join(told)
 

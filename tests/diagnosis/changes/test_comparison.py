@@ -265,3 +265,13 @@ def test_a_stop_stands_where_it_is_whatever_middle_the_tests_have(rng: np.random
     assert names(changes) == ["end_stop"]
     to = {c.parameter: c.to for c in changes.changes}
     assert to == pytest.approx(values, rel=0.1)
+
+
+def test_a_test_in_which_the_control_signal_moves_is_left_out_and_told(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng, voltages=(0.0, 100.0))
+    before, after = campaign(damper, rng), campaign(scaled(damper, T0_N=1.2), rng)
+    moving = replace(after[0], name="steps", voltage=np.where(after[0].time % 1.7 < 0.8, 0.0, 100.0))
+    changes = found(before, [*after, moving])
+    assert names(changes) == ["T0"]
+    assert "1 test of aged left out: the control signal moves" in changes.reason
+    assert "left out" not in found(before, after).reason
