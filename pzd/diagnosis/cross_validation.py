@@ -49,7 +49,7 @@ class Folds:
     folds: tuple[tuple[Mask, ...], ...]
     """Held-out samples of each fold, one mask (n,) per record."""
 
-    @property
+    @cached_property
     def no_samples(self) -> tuple[Mask, ...]:
         """Masks (n,), one per record, that hold out no sample."""
         return tuple(np.zeros_like(mask) for mask in self.folds[0])
@@ -248,6 +248,9 @@ SMALLEST_SINGULAR = 1e-10
 """Singular value of a fold's normal equations, scaled to a unit diagonal, below which it shows no direction.
 
 Reason: far above rounding, far below what tests determine."""
+FITS_TO_ALL = thresholds.CROSS_VALIDATED_CANDIDATES + 1
+"""Fits to every sample that are kept: those of the candidates of a step, which the best is asked for once more, and of
+the damper that they are compared with."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """Gives the damper refitted to all but the held-out samples; None where nothing is left."""
@@ -265,6 +268,8 @@ class CrossValidation(Folds):
     """A gap (r.m.s.) below this share of a test's peak force does not count."""
     _problems: dict[tuple[tuple[float | None, float | None], ...], Problem] = field(default_factory=dict, repr=False)
     """Problems of criterion (4) by voltages and temperatures of the base rows: of nothing else in a damper."""
+    _fits_to_all: dict[str, tuple[Problem, FitResult]] = field(default_factory=dict, repr=False)
+    """The last fits by criterion (4) to every sample, by the damper at which they begin."""
 
     def baseline_error(self) -> PredictionError:
         """Compute the held-out prediction error of the baseline, refitted by criterion (4) as identify fits it."""
@@ -302,6 +307,19 @@ class CrossValidation(Folds):
         -------
         the least-squares problem and its solution; None where nothing is left to fit
         """
+        if held_out is not self.no_samples:
+            return self._fitted_by_criterion(damper, held_out)
+        begun, kept = repr(damper), self._fits_to_all
+        found = kept.get(begun)
+        if found is None:
+            found = self._fitted_by_criterion(damper, held_out)
+            for old in [*kept][: 1 - FITS_TO_ALL]:
+                kept.pop(old, None)  # a thread beside may have dropped it
+            if found is not None:
+                kept[begun] = found
+        return found
+
+    def _fitted_by_criterion(self, damper: Damper, held_out: Sequence[Mask]) -> tuple[Problem, FitResult] | None:
         problem = self._criterion_problem(damper)(held_out)
         return None if problem is None else (problem, refit(problem, damper))
 

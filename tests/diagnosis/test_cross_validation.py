@@ -14,6 +14,7 @@ from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cross_validation_of, predicts_worse
 from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.verdict import no_prediction_note
 from pzd.record import Record
 
@@ -209,3 +210,21 @@ def test_to_first_order_each_test_is_predicted_as_by_a_refit_without_its_fold(rn
     assert (quick.criterion or 0.0) > 1.1 * seen.sum() / energy.sum()
     order = [slow.records.index(i) for i in quick.records]
     assert quick.error / quick.energy == pytest.approx((slow.error / slow.energy)[order], rel=0.05)
+
+
+def test_a_fit_to_every_sample_depends_on_the_damper_alone_whatever_was_fitted_before(rng: np.random.Generator) -> None:
+    """Those that are kept are of the damper asked for, with the effects and Jacobian that a fit of its own has."""
+    truth = damper_of((0.0,), gas_spring={"k_g": 4000.0}, preload_offset={"F_0": 60.0})
+    records = sines(truth, rng, (0.0,), tests=TESTS, cycles=3, noise=1e-3)
+    asked = validation(records, damper_of((0.0,)))
+    begun = [truth, truth.without_effects("gas_spring"), truth.without_effects("gas_spring", "preload_offset"), truth]
+    for damper in begun:
+        alone = validation(records, damper_of((0.0,)))
+        found, own = asked.fit_by_criterion(damper, asked.no_samples), alone.fit_by_criterion(damper, alone.no_samples)
+        assert found is not None
+        assert own is not None
+        (problem, fitted), (_, other) = found, own
+        assert fitted.damper == other.damper
+        limits = np.full(fitted.optimum.size, -np.inf), np.full(fitted.optimum.size, np.inf)
+        anew = linearise(problem, fitted.unknowns, fitted.optimum, limits)
+        np.testing.assert_allclose(fitted.jacobian.dense(), anew.jacobian.dense(), rtol=1e-9, atol=1e-12)

@@ -49,6 +49,12 @@ LARGEST_LOG_RATIO = 3.0
 
 Reason: two standard deviations of the prior; what ends there is not shown by the tests."""
 
+LARGEST_KEPT_JACOBIAN = 100_000
+"""Derivatives that an optimum keeps at most.
+
+Reason: 0.8 MB, so that a hundred candidates take a fifth of the memory of a command; campaigns of average cycles have
+fewer."""
+
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
@@ -66,7 +72,7 @@ class FitResult:
     prior: Array
     """(2 b, 3 b + e) Jacobian of the prior on C and k."""
     derive_jacobian: Callable[[], BlockJacobian]
-    """Computes `jacobian`, which of all candidates together would fill the memory."""
+    """Gives `jacobian`: computes it anew where those of all candidates together would fill the memory."""
     offset: float = 0.0
     """Distance to the optimum by the residuals [standard errors], see `pzd.fit.least_squares`."""
 
@@ -121,6 +127,7 @@ def fit(
     unknowns = problem.unknowns(effects)
     found, left, optimum = _search(problem, unknowns, start, start.size, evaluations, precision)
     limits = _bounds(problem, unknowns)
+    kept = left.jacobian if sum(block.size for _, block in left.jacobian.blocks) <= LARGEST_KEPT_JACOBIAN else None
     return FitResult(
         problem.point(found, unknowns).damper,
         tuple(effects),
@@ -129,7 +136,7 @@ def fit(
         left.simulated,
         unknowns,
         _prior(problem, len(unknowns)),
-        lambda: linearise(problem, unknowns, found, limits).jacobian,
+        (lambda: kept) if kept is not None else lambda: linearise(problem, unknowns, found, limits).jacobian,
         optimum.offset,
     )
 
