@@ -92,7 +92,7 @@ nist: $(DEV)  ## Print how the least squares do on the nonlinear regressions of 
 	PYTHONPATH=.:tests/fit $(BIN)/python tests/studies/nist.py
 
 .PHONY: plain-study
-plain-study: $(DEV)  ## Measure 600 plain dampers from everywhere: whether pzd says that nothing is missing; an hour
+plain-study: $(DEV)  ## Measure 600 plain dampers from everywhere: whether pzd says that nothing is missing; a quarter of an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/plain_study.py --jobs $(JOBS)
 
 .PHONY: fuzz
