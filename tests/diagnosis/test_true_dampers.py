@@ -15,7 +15,7 @@ from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force
 from pzd.diagnosis.fit.problem import Budget
 from pzd.record import mid_stroke
 from pzd.signals.cycles import cycles
-from tests.studies.plain_study import SEED, Case, drawn, rig_of
+from tests.studies.plain_study import SEED, Case, drawn, judged, rig_of
 
 
 @dataclass(frozen=True)
@@ -101,3 +101,8 @@ def test_tests_that_the_steps_of_a_channel_misread_alike_know_no_more_than_one()
     alike = [p for p in (first, *others) if p.record.name.split("-")[0] in ("t00", "t01", "t02")]
     assert [p.read_alike for p in alike] == [3, 3, 3]
     assert cycles(first.record.time, first.record.displacement) is not None
+
+
+def test_a_stiff_spring_that_no_sample_shows_makes_no_gap() -> None:
+    """Friction that turns within a sample: the fit tells no spring from another, and the flank asks for the rigid one."""
+    assert judged(drawn(SEED, 600)[483], SEED).kind == "none"
