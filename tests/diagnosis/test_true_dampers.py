@@ -104,5 +104,5 @@ def test_tests_that_the_steps_of_a_channel_misread_alike_know_no_more_than_one()
 
 
 def test_a_stiff_spring_that_no_sample_shows_makes_no_gap() -> None:
-    """Friction that turns within a sample: the fit tells no spring from another, and the flank asks for the rigid one."""
+    """Friction that turns within a sample: the fit tells no spring from another, the flank asks for the rigid one."""
     assert judged(drawn(SEED, 600)[483], SEED).kind == "none"
