@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from fresh_truths import sine_test, with_noise
 
 from pzd.identification.bingham_fit import Bingham
@@ -18,15 +17,23 @@ NEAR = 0.03
 """Share within which a value counts as right where its interval is narrower than what the steps leave."""
 
 
-@pytest.mark.parametrize("draw", range(6))
-def test_steps_of_the_displacement_leave_the_parameters_alone(draw: int, rng: np.random.Generator) -> None:
-    """Steps of 0.05 to 0.5 mm in 40 mm; in every other draw each cycle meets them alike, without scatter."""
+def test_steps_of_the_displacement_leave_the_parameters_alone(rng: np.random.Generator) -> None:
+    """Steps of 0.05 to 0.5 mm in 40 mm; in every other draw each cycle meets them alike, without scatter.
+
+    Of 24 dampers one may have a value outside its 95 % interval and three percent off.
+    """
+    wrong = [found for draw, one in enumerate(rng.spawn(24)) if (found := _wrong(one, alike=bool(draw % 2)))]
+    assert len(wrong) <= 1, wrong
+
+
+def _wrong(rng: np.random.Generator, *, alike: bool) -> tuple[str, ...]:
+    """Draw a damper and its tests, and name the parameters that are neither near nor inside their interval."""
     frequency, step = rng.uniform(0.6, 2.0), 10.0 ** rng.uniform(np.log10(5e-5), np.log10(5e-4))
     peak, share = 10.0 ** rng.uniform(2.3, 3.7), rng.uniform(0.1, 0.9)
     damping = (1.0 - share) * peak / (np.pi * frequency * STROKE)
     friction = share * peak
     truth = Bingham(friction, damping, max(10.0 ** rng.uniform(5.3, 7.0), 10.0 * friction / STROKE))
-    if draw % 2:
+    if alike:
         frequency = 1000.0 / round(1000.0 / frequency)
     tests = []
     for hertz, amplitude in ((frequency, 0.5 * STROKE), (0.5 * frequency, 0.5 * STROKE), (frequency, 0.25 * STROKE)):
@@ -35,7 +42,10 @@ def test_steps_of_the_displacement_leave_the_parameters_alone(draw: int, rng: np
         )
         tests.append(replace(test, displacement=step * np.round(test.displacement / step)))
     row, _ = identify_condition(Condition(None, None, None, tuple(tests)), IdentifyConfig(), 1)
+    found = []
     for name, true in zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), truth, strict=True):
         value, low, high = (getattr(row, name + end) for end in ("", "_low95", "_high95"))
         near = value is not None and abs(value / true - 1.0) < NEAR
-        assert near or ((low is None or low <= true) and (high is None or true <= high)), (name, true, row)
+        if not near and ((low is not None and low > true) or (high is not None and true > high)):
+            found.append(f"{name} {true} not in {low} to {high}")
+    return tuple(found)
