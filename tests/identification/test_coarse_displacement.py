@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from fresh_truths import sine_test, with_noise
+from scipy.stats import binom
 
 from pzd.identification.bingham_fit import Bingham
 from pzd.identification.condition import identify_condition
@@ -20,10 +21,10 @@ NEAR = 0.03
 def test_steps_of_the_displacement_leave_the_parameters_alone(rng: np.random.Generator) -> None:
     """Steps of 0.05 to 0.5 mm in 40 mm; in every other draw each cycle meets them alike, without scatter.
 
-    Of 24 dampers one may have a value outside its 95 % interval and three percent off.
+    Of 24 dampers 72 values, half of them within three percent: the others are off by the chance of a 95 % interval.
     """
     wrong = [found for draw, one in enumerate(rng.spawn(24)) if (found := _wrong(one, alike=bool(draw % 2)))]
-    assert len(wrong) <= 1, wrong
+    assert sum(map(len, wrong)) <= binom.ppf(0.95, 72, 0.05) / 2, wrong
 
 
 def _wrong(rng: np.random.Generator, *, alike: bool) -> tuple[str, ...]:
