@@ -33,7 +33,7 @@ from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps
 from pzd.signals.lack_of_fit import fit_smooth_residual
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, PureError, pure_error
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import DELAYS_TRIED, NuisanceConfig
 from pzd.signals.splines import cubic, even_cubic
 
 # --- Nuisances
@@ -258,7 +258,10 @@ class WeightedRecord:
         return np.asarray(found - np.outer(own, own @ found) * ((1.0 - 1.0 / np.sqrt(1.0 + square)) / square))
 
     def delay_among_jumps(self, at: Callable[[float], Array]) -> float:
-        """Find the delay [s] of least misfit among `DELAYS_TRIED`; see `likeliest_delay`."""
+        """Find the delay [s] of least misfit among `DELAYS_TRIED`: where the force jumps, its slope leads no further.
+
+        See `likeliest_delay`, which goes on from there.
+        """
         shares = np.linspace(-LARGEST_DELAY, LARGEST_DELAY, DELAYS_TRIED)
         left = self.standardised(np.column_stack([self.measured - at(share * self.delay_s) for share in shares]))
         return float(self.delay_s * shares[np.argmin(np.sum(left**2, axis=0) + shares**2)])
@@ -324,9 +327,6 @@ SHIFTS = 12
 """Most steps in which the likeliest delay of a test is found, each along the slope of the force.
 
 Reason: a jump of dry friction goes by a sample or two a step."""
-DELAYS_TRIED = 31
-"""Delays from which that search begins where the force jumps, over all that the limit admits: a fifth of a standard
-deviation apart, which is less than a sample up to 10 kHz. Along the slope alone it ends at the nearest jump."""
 SAME_DELAY = 1e-4
 """Change of the delay at which its search ends [standard deviations]: the misfit changes by its square."""
 DISCREPANCY = 0.3
