@@ -6,6 +6,7 @@ motion on a slow wave is small in the displacement and large in the speed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.signals.measures import resolution, usual_step
-from pzd.signals.smoothing import HIGHEST, low_pass, without_steps
+from pzd.signals.smoothing import HIGHEST, cut_above, low_pass, motion_below, resolved_below, without_steps
 from pzd.signals.splines import is_even
 
 MOST_SAMPLES = 2**18
@@ -75,18 +76,28 @@ def periodic_section(time: Array, displacement: Array) -> PeriodicSection | None
         grid = np.arange(time[0], time[-1] + 0.5 * step, step)
         x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
-    smooth = low_pass(without_steps(x, resolution(displacement)), HIGHEST)  # the speed of a step is no motion
     # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
     outer = int(RAMPS * (last - first) * usual_step(time) / step)
     inner = x[int((time[first] - time[0]) / step) + outer : int((time[last] - time[0]) / step) - outer]
-    for candidate in chain.from_iterable(_candidate_lags(part) for part in (x, inner)):
-        lag, section = candidate, _section(x, smooth, candidate, least)
-        if section is not None:
-            # Ramps pull the lag of the whole record aside: look again at the section alone.
-            lag = _refined_lag(x[section[0] : int(section[1])], candidate)
-            section = _section(x, smooth, lag, least) or section
-            return PeriodicSection(lag * step, float(grid[0]) + section[0] * step, float(grid[0]) + section[1] * step)
+    for smooth in _smoothed(x, resolution(displacement)):
+        for candidate in chain.from_iterable(_candidate_lags(part) for part in (x, inner)):
+            lag, section = candidate, _section(x, smooth, candidate, least)
+            if section is not None:
+                # Ramps pull the lag of the whole record aside: look again at the section alone.
+                lag = _refined_lag(x[section[0] : int(section[1])], candidate)
+                section = _section(x, smooth, lag, least) or section
+                begin, end = (float(grid[0]) + place * step for place in section)
+                return PeriodicSection(lag * step, begin, end)
     return None
+
+
+def _smoothed(x: Array, step: float) -> Iterator[Array]:
+    """Yield a motion (n,) as its speed is asked of: the speed of a step is no motion.
+
+    Nor is that of noise, which at a high rate exceeds any of the rod: where so nothing repeats, without it.
+    """
+    yield low_pass(without_steps(x, step), HIGHEST)
+    yield cut_above(x, min(motion_below(x), resolved_below(x, step)))[0]
 
 
 def moving_range(displacement: Array) -> tuple[int, int]:
