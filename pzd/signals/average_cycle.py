@@ -74,7 +74,8 @@ class AverageCycle:
     def read_alike(self, other: AverageCycle) -> bool:
         """Whether the steps of the channel err alike in two cycles: equal motions from one zero, and no noise over it.
 
-        Equation: max |x_1 - x_2| < q / 2 pi, at which the sawtooth x mod q moves by one radian
+        Equation: |m_1 - m_2| + sum_h 2 ||c_1h| - |c_2h|| < q / 2 pi, at which the sawtooth x mod q moves by a radian;
+        m the mean, whatever the phase at which a cycle begins
         """
         if self.step == 0.0 or other.step == 0.0:
             return False

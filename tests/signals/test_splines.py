@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pzd.signals.splines import cubic, even_cubic, even_derivatives, integral
+from pzd.signals.splines import cubic, even_cubic, even_derivatives, integral, with_ringing
 
 ROUNDING = 1e-13
 """Of the largest value."""
@@ -74,3 +74,23 @@ def test_the_integral_is_that_of_the_spline(samples: int, jitter: float, rng: np
     moments = np.concatenate([time, rng.uniform(time[0] - 1e-3, time[-1] + 1e-3, 3 * samples)])
     expected = CubicSpline(time, values).antiderivative()(moments)
     assert np.max(np.abs(integral(time, values)(moments) - expected)) <= 1e-12 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_spline_rings_beside_a_jump_by_no_more_than_is_said(closed: bool) -> None:
+    step = np.where(np.arange(40) < 20, 0.0, 1.0)
+    course, at = even_cubic(step), np.linspace(0.0, 39.0, 3901)
+    off = np.abs(course(at) - step[np.round(at).astype(int)])
+    jump = np.zeros(40)
+    jump[19:21] = 1.0
+    said = with_ringing(jump, closed=closed)
+    for away in range(1, 5):
+        beside = (at > 20.0 + away - 1.0) & (at < 20.0 + away)
+        assert np.max(off[beside]) == pytest.approx(said[20 + away], rel=0.02)
+
+
+def test_what_rings_over_the_end_of_a_cycle_comes_at_its_beginning() -> None:
+    jump = np.zeros(40)
+    jump[-1] = 1.0
+    assert with_ringing(jump, closed=True)[0] == pytest.approx(0.108)
+    assert with_ringing(jump, closed=False)[0] == 0.0

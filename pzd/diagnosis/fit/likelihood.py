@@ -34,7 +34,7 @@ from pzd.signals.lack_of_fit import fit_smooth_residual
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, PureError, pure_error
 from pzd.signals.nuisance import DELAYS_TRIED, NuisanceConfig
-from pzd.signals.splines import cubic, even_cubic
+from pzd.signals.splines import cubic, even_cubic, with_ringing
 
 # --- Nuisances
 
@@ -536,6 +536,8 @@ def with_nuisances(
 ) -> WeightedRecord:
     """Integrate out the test's own offset and gain, jumps and instants of the voltage, and find its likeliest delay.
 
+    Cycles are folded by splines and a delayed force is read from one, which ring beside jumps: that is left out too.
+
     Equation: V = [s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
     """
     averaged, delayed = isinstance(bare.noise, PureError), bare.delayed(*prompt_force(bare, damper))
@@ -548,7 +550,7 @@ def with_nuisances(
             [
                 np.full(force.size, nuisance.offset * bare.peak),
                 nuisance.gain * force,
-                _jump_columns(_with_ringing(np.maximum(bends, turns))),
+                _jump_columns(with_ringing(np.maximum(bends, turns), closed=averaged)),
                 *([] if timing is None else [timing]),
             ]
         )
@@ -581,28 +583,6 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
     weights[0] /= np.sqrt(2.0)
     nothing = MarginalisedNuisances.none(2 * weights.size - 1)
     return replace(weighed, weights=weights, nuisances=nothing, delay_s=0.0)
-
-
-RINGING = 2.0 - np.sqrt(3.0)
-"""Share by which a cubic spline through equidistant samples rings less from one sample to the next.
-
-Reason: root of z^2 + 4 z + 1 = 0, which its equations of continuity have between two jumps (de Boor 1978, ch. IV)."""
-OVERSHOOT = 0.108
-"""By how much it overshoots beside a jump of one, at most, in the interval before or after: of its cardinal series."""
-RINGING_SAMPLES = 4
-"""Samples over which it rings: 1/500 of a jump is left then."""
-
-
-def _with_ringing(bends: Array) -> Array:
-    """Return the (n,) bends near jumps with what splines make of them at the samples around [N].
-
-    Cycles are folded by splines, and a delayed force is read from one.
-    """
-    found = bends
-    for away in range(1, RINGING_SAMPLES + 1):
-        beside = np.maximum(np.roll(bends, away), np.roll(bends, -away))
-        found = np.maximum(found, OVERSHOOT * RINGING ** (away - 1) * beside)
-    return found
 
 
 def _jump_columns(bends: Array) -> Array:
