@@ -180,7 +180,13 @@ def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, .
     """Return two cycles of the lead, and the same with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
     two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
-    motions = [average.motion(average.clear_harmonics + average.error(draw), POINTS_OF_DRAW) for _ in range(DRAWS)]
+
+    def other() -> Callable[[Array], Motion]:
+        error = average.error(draw)
+        error[: average.clear_harmonics.size] += average.clear_harmonics
+        return average.motion(error, POINTS_OF_DRAW)
+
+    motions = [other() for _ in range(DRAWS)]
     return (two, *(_with_motion(two, motion(two.time)) for motion in motions))
 
 

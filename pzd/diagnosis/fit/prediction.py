@@ -13,7 +13,7 @@ from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, Rows
-from pzd.signals.jumps import beside_unresolved_reversals, jumps
+from pzd.signals.jumps import beside_unresolved_reversals, jump_timing_error, jumps
 from pzd.signals.measures import reversals
 from pzd.signals.noise import harmonics_of
 
@@ -201,7 +201,8 @@ def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float
 def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | float:
     """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
 
-    What they change beside a jump is its instant, which is left to chance in any case.
+    What they change beside a jump is its instant, which is left to chance, as far as it goes: what a sample earlier or
+    later does not explain remains, and is all that counts in the mean, for a stuck damper keeps the offset it began with.
 
     Steps that err alike in n tests give n of them the same error: each counts n times, so that all of them together
     know no more than one.
@@ -223,10 +224,13 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
     turns = unresolved_turns(damper, prepared.draws[0].displacement[points:], closed=True)
     calm = np.maximum(jumps(known, closed=True), turns) == 0.0
-    changes = np.fft.rfft((np.stack(others) - known) * calm, points, axis=1) / points
+    by_timing = np.stack([jump_timing_error(other, known, closed=True) for other in others])
+    left = np.stack(others) - known - np.where(calm, 0.0, by_timing)
+    changes = np.fft.rfft(left, points, axis=1) / points
     power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
-    power[0] = 0.0  # a stuck damper keeps whatever offset it began with
+    beside_jumps = prepared.read_alike * np.mean(np.mean(left * ~calm, axis=1) ** 2)
+    power[0] = 0.0
     width = np.ones(2 * NEIGHBOURS + 1)
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
-    smooth[0] = 0.0
+    smooth[0] = beside_jumps
     return smooth
