@@ -21,7 +21,7 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult, refit
-from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
+from pzd.diagnosis.fit.likelihood import equally_weighted, prompt_force, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.record import Array, Mask
@@ -503,7 +503,16 @@ class CrossValidation(Folds):
 
     def _refit_by_likelihood(self, damper: Damper) -> _Refit:
         problem = evidence_of(self.campaign, damper).whole
-        return lambda held_out: _refitted(_reduced_problem(self.campaign, problem, damper, held_out), damper)
+
+        def without(held_out: Sequence[Mask]) -> Damper | None:
+            reduced = _reduced_problem(self.campaign, problem, damper, held_out)
+            found = _refitted(reduced, damper)
+            if reduced is None or found is None:
+                return found
+            fewer = damper.without_effects(*_not_shown(reduced, found))
+            return found if len(fewer.effects) == len(damper.effects) else _refitted(reduced, fewer)
+
+        return without
 
     def _refit_by_criterion(self, damper: Damper) -> _Refit:
         problem = self._criterion_problem(damper)
@@ -554,6 +563,33 @@ def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
         return None
     found, rows = refit(problem, damper, REFIT_EVALUATIONS).damper, {o.base_row for o in problem.observations}
     return found if -1 in rows else with_rows(found, [found.base[i] for i in sorted(rows)])
+
+
+def _not_shown(problem: Problem, damper: Damper) -> list[str]:
+    """List the effects of a damper that hardly change its misfit: without the tests that show them, none is found.
+
+    The stop at the end of the longest test is one, where that is held out: refitted, it stands just beyond the others,
+    and is as hard as the last of their noise likes.
+
+    Equation: |r|^2 without it - |r|^2 < p ln n, p its parameters       Source: Schwarz 1978, Ann. Stat. 6, 461-464
+    """
+    whole = _misfit(problem, damper)
+    size = sum(o.weights.size * 2 - 1 if o.weights.size else o.measured.size for o in problem.observations)
+    return [
+        name
+        for name in damper.effects
+        if _misfit(problem, damper.without_effects(name)) - whole < len(problem.unknowns((name,))) * float(np.log(size))
+    ]
+
+
+def _misfit(problem: Problem, damper: Damper) -> float:
+    """Compute the sum of squared residuals of a damper, in units of noise."""
+    total = 0.0
+    for o in problem.observations:
+        force, sensors = prompt_force(o, damper)
+        left = o.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)
+        total += float(np.sum(left**2))
+    return total
 
 
 def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) -> CrossValidation:
