@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from pzd.signals.average_cycle import AverageCycle, variance_by_steps
+from pzd.signals.average_cycle import AverageCycle, positive_mean, variance_by_steps
 from pzd.signals.cycles import Cycles
 from pzd.signals.measures import resolution
 
@@ -66,6 +66,48 @@ def test_what_a_drive_adds_below_the_steps_is_known_as_far_as_they_let_it(rng: G
         stated.append(np.mean(np.abs(draws) ** 2))
     assert 0.3 < np.mean(np.array(errors) / np.array(stated)) < 2.0
     assert np.sqrt(np.mean(errors)) < 0.6 * 1.25e-3 * stroke
+
+
+@pytest.mark.parametrize(
+    ("noise", "step"),
+    [(1e-3, 0.0), (3e-3, 0.0), (1e-4, 0.01), (1e-4, 0.03)],
+    ids=["little noise", "noise", "fine steps", "coarse steps"],
+)
+def test_the_error_of_a_triangle_is_as_large_as_stated(noise: float, step: float, rng: Generator) -> None:
+    """Of its speed, octave by octave: a corner goes on above what noise and steps let be seen of it."""
+    points, cycles = 200, 6
+    time = np.arange(cycles * points) / points
+    order = np.arange(1, 800, 2)
+    corner = 1.0 / order**2 / (1.0 + (order / 60.0) ** 2)
+    x = (corner[:, None] * np.cos(2.0 * np.pi * order[:, None] * (time + 0.0013))).sum(axis=0)
+    harmonics = np.fft.rfft(x[:points]) / points
+    errors, stated = [], []
+    for _ in range(20):
+        seen = x + noise * rng.standard_normal(x.size)
+        if step:
+            zero = step * rng.uniform(-0.5, 0.5)
+            seen = step * np.round((seen + zero) / step) - zero
+        average = AverageCycle.of(time, seen, Cycles(1.0, 0.0, cycles))
+        size = average.harmonics.size
+        speed = (np.arange(size) + 0.0) ** 2
+        errors.append(speed * np.abs(average.clear_harmonics - harmonics[:size]) ** 2)
+        stated.append(np.mean([speed * np.abs(average.error(rng)[:size]) ** 2 for _ in range(10)], axis=0))
+    found, said = np.mean(errors, axis=0), np.mean(stated, axis=0)
+    for low in (8, 16, 32, 64):
+        octave = slice(low, min(2 * low, found.size))
+        assert 0.1 < np.sum(found[octave]) / np.sum(said[octave]) < 3.0, low
+
+
+def test_what_noise_hides_is_expected_and_what_it_shows_is_believed(rng: Generator) -> None:
+    """Powers drawn from an exponential of mean 1 and seen with an error: their mean, given what was seen."""
+    true = rng.exponential(1.0, 400_000)
+    for error in (0.1, 1.0, 5.0):
+        seen = true + error * rng.standard_normal(true.size)
+        given = positive_mean(seen, np.full(true.size, error), np.ones(true.size))
+        assert np.mean(given) == pytest.approx(1.0, abs=0.01)
+        least = seen < np.quantile(seen, 0.1)
+        assert np.mean(given[least]) == pytest.approx(np.mean(true[least]), rel=0.02)
+        assert np.mean((given - true) ** 2) < np.mean((np.maximum(seen, 0.0) - true) ** 2)
 
 
 def test_the_step_of_a_channel_is_that_of_its_values_now() -> None:
