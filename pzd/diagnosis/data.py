@@ -11,7 +11,7 @@ its sensor. Noise of a constant voltage would look like steps of the voltage.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal

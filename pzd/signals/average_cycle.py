@@ -43,7 +43,8 @@ Reason: nearer it is exact, farther the difference of two large numbers."""
 BEYOND = 3
 """Multiple of the highest harmonic up to which an error is drawn.
 
-Reason: of the speed at a corner, beyond the highest harmonic, two thirds of the power are below, and a drawn cycle has points for it."""
+Reason: two thirds of the power that the speed at a corner has beyond the highest harmonic lie below, and a drawn cycle
+has the points for it."""
 LEFT_OUT_DRAWS = 6
 """Draws of the noise by which the power of the motion in what is left out is told from it."""
 
@@ -168,7 +169,7 @@ class AverageCycle:
         return np.asarray(np.where(counted, found, self.distortion[1]))
 
     def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
-        """Draw (3 H + 1,) an error of `clear_harmonics`: noise in what is kept, what is left out, and what is beyond."""
+        """Draw (3 H + 1,) an error of `clear_harmonics`: noise in what is kept, what is left out and what is beyond."""
         _, found = self._noise(draw)
         beyond = self.corner / np.arange(found.size, BEYOND * (found.size - 1) + 1.0) ** 4
         power = np.concatenate([self.left_out, beyond])
@@ -212,7 +213,8 @@ def positive_mean(seen: Array, error: Array, expected: Array) -> Array:
     --------
     Seen well, not at all, and as nothing:
 
-    >>> positive_mean(np.array([3.0, -5.0, 0.0]), np.array([1e-3, 1e3, 1.0]), np.array([1.0, 1.0, 1e6])).round(3).tolist()
+    >>> seen, error, expected = np.array([3.0, -5.0, 0.0]), np.array([1e-3, 1e3, 1.0]), np.array([1.0, 1.0, 1e6])
+    >>> positive_mean(seen, error, expected).round(3).tolist()
     [3.0, 1.0, 0.798]
     """
     from scipy.special import erfcx

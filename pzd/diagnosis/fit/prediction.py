@@ -202,7 +202,7 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
 
     What they change beside a jump is its instant, which is left to chance, as far as it goes: what a sample earlier or
-    later does not explain remains, and is all that counts in the mean, for a stuck damper keeps the offset it began with.
+    later does not explain remains. In the mean nothing else counts, for a stuck damper keeps the offset it began with.
 
     Steps that err alike in n tests give n of them the same error: each counts n times, so that all of them together
     know no more than one.
