@@ -57,7 +57,7 @@ def test_a_missing_effect_lowers_the_held_out_error(rng: np.random.Generator) ->
 
 
 def test_a_stop_that_one_test_shows_is_not_foretold_by_the_others(rng: np.random.Generator) -> None:
-    """Refitted to tests that end just before it, its hardness is their noise: 90 times the error of the plain damper."""
+    """Refitted to tests that end just before it, its hardness is their noise: 90 times the error of the plain one."""
     truth = damper_of((0.0,), end_stop={"k_e": 2e6, "x_e": 0.02})
     tests = ((0.5, 0.0201), (1.0, 0.0201), (2.0, 0.0201), (1.0, 0.0214))
     plain = damper_of((0.0,))
