@@ -284,6 +284,20 @@ def test_a_force_that_bends_over_a_little_is_told_where_half_of_it_is_friction(r
     assert np.median(missing) == pytest.approx(1.0, rel=0.3)
 
 
+def test_a_force_that_is_cut_off_for_two_thirds_of_the_time_is_told(rng: np.random.Generator) -> None:
+    """Of a sine the force is beyond friction and half of the damping so long; of C a half is missing."""
+    missing = []
+    for one in rng.spawn(FEWER):
+        share = float(one.uniform(0.5, 0.65))
+        damper = drawn(one, friction=share)
+        peak = float(np.abs(damper.force).max())
+        limit = (share + 0.42 * (1.0 - share)) * peak
+        record = replace(damper, noise=1e-3 * peak).recorded(one, np.clip(damper.force, -limit, limit))
+        missing += [f.size / (peak - limit) for f in sizes([record], amplifier) if f.check == "range"]
+    assert len(missing) >= 0.6 * FEWER
+    assert np.median(missing) == pytest.approx(1.0, rel=0.25)
+
+
 def test_no_range_ends_where_a_stiff_damper_is_sampled_coarsely(rng: np.random.Generator) -> None:
     """The first grid is coarse there: what finds the right element first is no reason to tell of an amplifier."""
     for one in rng.spawn(3 * FEWER):

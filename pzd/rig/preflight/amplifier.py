@@ -177,7 +177,7 @@ CLOSER_LIMITS = 1.15
 """Factor about the best of them within which it is looked for more closely."""
 CLOSEST = 4
 """Zooms of the grid at the best range: as many as of the reference without one."""
-CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.35)
+CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.34, 0.37, 0.4)
 """Shares of the samples, at either end, that may be cut off: of more, friction alone is flat too."""
 LEAST_BETWEEN = 20
 """Fewest samples between the ends, for the four columns of the reference."""
