@@ -16,6 +16,7 @@ import numpy as np
 from pzd.artefacts import Finding, RecordEntry
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
+from pzd.rig.preflight.force import best_delay
 from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
 from pzd.rig.preflight.sensors import coarse_step
 from pzd.signals.cycles import MEDIAN_OF_NORMAL
@@ -57,7 +58,7 @@ def amplifier(test: PreflightRecord) -> Iterator[Finding]:
     beyond, left = min(plain.residual, without) - noise, best.residual
     if beyond < max(WORTH_OF_RANGE, chance) or left - noise >= EXPLAINS * beyond:
         return
-    if finding.check == "filter" and _rounded_yield(section) < max(left, WORTH):
+    if finding.check == "filter" and (_rounded_yield(section) < max(left, WORTH) or _late(test, section) < left):
         return
     yield finding
 
@@ -142,6 +143,11 @@ def _rounded_yield(section: Section) -> float:
         rest = force - design @ np.linalg.lstsq(design, force)[0]
         shares.append(float(rest @ rest) / section.squares)
     return min(shares)
+
+
+def _late(test: PreflightRecord, section: Section) -> float:
+    """Return the share of the squares left by a force that is late, and as it is otherwise."""
+    return fit_element(section, section.delayed(np.array([best_delay(test)[0]]))).residual
 
 
 def _behind(section: Section, order: int, corner: float, zooms: int = 1) -> ReferenceFit:
