@@ -35,6 +35,8 @@ LEAST_RECORDS = 3
 """Records from which there is a usual offset."""
 BY_CHANCE = 0.02
 """P value below which offsets rise or fall with the speed by no chance: five in order throughout have 1/60."""
+OF_FEW = 0.34
+"""P value of three in order, 1/3: no proof, but reason enough to take nothing out as a tare."""
 LEAST_SLIP = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -79,10 +81,15 @@ def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
         return entry
     if np.ptp(offsets) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{OFFSET_MEANS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
-    elif _rise_with_speed(entries):
+    elif (chance := _in_order_of_speed(entries)) <= BY_CHANCE:
         follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
     elif usual and abs(mine + usual) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
+    elif chance <= OF_FEW and abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
+        follows = (
+            f"{usual:+.4g} N is usual in this setting; it goes with the speed of the few tests, as where rebound is "
+            "unlike compression; else a tare that changed"
+        )
     elif abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: a tare that changed; take it out of these files (fixture)"
     else:
@@ -95,15 +102,15 @@ def _offset_of(entry: RecordEntry) -> float:
     return next((finding.size for finding in entry.findings if finding.check == "offset"), 0.0)
 
 
-def _rise_with_speed(entries: list[RecordEntry]) -> bool:
-    """Whether the offsets of records rise, or fall, with the speed.
+def _in_order_of_speed(entries: list[RecordEntry]) -> float:
+    """Return the probability that the offsets of records rise, or fall, so orderly with the speed by chance.
 
     Equation: the exact probability of Kendall's tau        Source: Kendall 1938, Biometrika 30
     """
     from scipy.stats import kendalltau
 
     pairs = [(e.velocity_rms_m_per_s or 0.0, _offset_of(e)) for e in entries if _offset_of(e) != 0.0]
-    return len(pairs) > LEAST_RECORDS and bool(kendalltau(*zip(*pairs, strict=True)).pvalue <= BY_CHANCE)
+    return float(kendalltau(*zip(*pairs, strict=True)).pvalue) if len(pairs) >= LEAST_RECORDS else 1.0
 
 
 # --- Delay ---
