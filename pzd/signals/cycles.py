@@ -90,7 +90,9 @@ class Cycles:
         instants = self.instants(time)
         # A spline forgets in a few samples: eight beyond the run are as good as all, and cheaper.
         reach = 8 * (time[1] - time[0])
-        near = (time >= instants[0, 0] - reach) & (time <= instants[-1, -1] + reach)
+        # A view: a copy of the clock of a long record for each channel would be kept with what is known of it.
+        first = np.searchsorted(time, instants[0, 0] - reach)
+        near = slice(first, np.searchsorted(time, instants[-1, -1] + reach, "right"))
         return cubic(time[near], values[near])(instants)
 
     @found_once

@@ -98,6 +98,20 @@ def test_a_guess_needs_nothing_filled_in_where_the_headers_say_all(tmp_path: Pat
     assert np.abs(record.force - FORCE).max() < 1e-5
 
 
+@pytest.mark.parametrize("heads", ["time_s,displacement_m,force_N", "Time (s),Pos (m),Load (N)"])
+def test_which_way_is_rebound_is_always_asked_and_the_answer_turns_both_channels(tmp_path: Path, heads: str) -> None:
+    """No recording tells: a damper turned round gives the same loops, and asymmetry would pass for its mirror image."""
+    path = stored(tmp_path / "a.csv", [heads], [numbers(values) for values in (TIME, X, FORCE)], ",")
+    text = guessed([path])
+    (asked,) = [line for line in text if line.startswith("# Is extension (rebound) positive")]
+    (answer,) = re.findall(r"say (sign: \{.*\})\.$", asked)
+    (record,) = read_back(tmp_path, [path]).records
+    (tmp_path / "turned.yaml").write_text("\n".join([*text, f"      {answer}"]), encoding="utf-8")
+    (turned,) = ingest(load(tmp_path / "turned.yaml").rig, Control(), tmp_path).records
+    assert turned.displacement == pytest.approx(-record.displacement)
+    assert turned.force == pytest.approx(-record.force)
+
+
 def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_path: Path) -> None:
     heads = "Time (s),Load (V),Stroke (V),Load (N),Stroke (mm),Temp (C),Coil current (A)"
     volts = [numbers(values) for values in (TIME, FORCE / 500.0, X * 100.0, FORCE, MM, 0 * X + 22.5, 0 * X + 0.5)]

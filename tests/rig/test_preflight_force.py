@@ -44,6 +44,17 @@ def test_a_rigid_damper_with_sigmoid_friction_is_not_late(
         assert list(delay(measured(x, damping))) == []
 
 
+@pytest.mark.parametrize(("late", "at_edge"), [(0.08, False), (0.12, True)])
+def test_a_delay_at_the_edge_of_the_search_is_told_as_such(
+    late: float, at_edge: bool, rng: np.random.Generator
+) -> None:
+    x = random_motion(rng)
+    force = np.interp(TIME - late, TIME, element_force(x, 1e-3, 200.0, 900.0, 4e5))
+    (told,) = delay(measured(x, force))
+    assert ("at the edge of the search: it may be more" in told.where) == at_edge
+    assert told.size == pytest.approx(0.1 if at_edge else late, abs=5e-3)
+
+
 def test_delays_are_looked_for_only_where_the_element_leaves_something(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

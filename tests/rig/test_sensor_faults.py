@@ -221,6 +221,18 @@ def test_a_late_force_is_found_up_to_half_a_cycle(late: float, share: float, rng
     assert max(told) < 1.05 * late
 
 
+@pytest.mark.parametrize("sine", [(1.0, 0.01), (1.0, 0.02), (2.0, 0.02)])
+def test_a_late_force_on_a_soft_oil_spring_is_no_low_pass(sine: tuple[float, float], rng: np.random.Generator) -> None:
+    """20 ms beside a spring of 1 mm: a low-pass of second order at 16 to 23 Hz took nine tenths, and was told."""
+    time, settled = np.arange(28000) / 4000.0, slice(4000, None)
+    x = sine[1] * np.sin(2.0 * np.pi * sine[0] * time)
+    force = np.interp(time - 0.02, time, element_force(x, 2.5e-4, 300.0, 1000.0, 3e5))
+    seen = Drawn(1000.0, *sine, time[:24000], x[settled], force[settled], 1.0, 0.0).recorded(rng)
+    assert sizes([seen], amplifier) == []
+    (told,) = sizes([seen], delay)
+    assert told.size == pytest.approx(0.02, abs=5e-4)
+
+
 def low_passed(damper: Drawn, order: int, corner: float, values: Array) -> Array:
     b, a = butter(order, 2.0 * corner / (damper.rate * FINE))
     return np.asarray(lfilter(b, a, values, zi=lfilter_zi(b, a) * values[0])[0])
@@ -282,6 +294,20 @@ def test_a_force_that_bends_over_a_little_is_told_where_half_of_it_is_friction(r
         missing += [f.size / (peak - np.abs(shown).max()) for f in sizes([record], amplifier) if f.check == "range"]
     assert len(missing) >= FEWER
     assert np.median(missing) == pytest.approx(1.0, rel=0.3)
+
+
+def test_a_force_that_is_cut_off_for_two_thirds_of_the_time_is_told(rng: np.random.Generator) -> None:
+    """Of a sine the force is beyond friction and half of the damping so long; of C a half is missing."""
+    missing = []
+    for one in rng.spawn(FEWER):
+        share = float(one.uniform(0.5, 0.65))
+        damper = drawn(one, friction=share)
+        peak = float(np.abs(damper.force).max())
+        limit = (share + 0.42 * (1.0 - share)) * peak
+        record = replace(damper, noise=1e-3 * peak).recorded(one, np.clip(damper.force, -limit, limit))
+        missing += [f.size / (peak - limit) for f in sizes([record], amplifier) if f.check == "range"]
+    assert len(missing) >= 0.6 * FEWER
+    assert np.median(missing) == pytest.approx(1.0, rel=0.25)
 
 
 def test_no_range_ends_where_a_stiff_damper_is_sampled_coarsely(rng: np.random.Generator) -> None:

@@ -413,6 +413,10 @@ def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
 
 _SHOWN = 6
 """Headers that a refusal shows: the quantities of a rig, mostly."""
+_REBOUND = (
+    "# Is extension (rebound) positive in the files? Where compression is, say sign: {displacement: -1, force: -1}."
+)
+"""Nothing in a recording tells: a damper turned round gives the same loops."""
 _WITHOUT_CAR = (
     "# No control signal was found. A report on the damper alone, without a car that rides on it, needs this line too:",
     "# car: false",
@@ -443,6 +447,7 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if fitting:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
+    lines.append(_REBOUND)
     if not any(entry.controlled for entry in entries):
         lines += _WITHOUT_CAR
     if control != Control():

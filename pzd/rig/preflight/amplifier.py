@@ -16,6 +16,7 @@ import numpy as np
 from pzd.artefacts import Finding, RecordEntry
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
+from pzd.rig.preflight.force import best_delay
 from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
 from pzd.rig.preflight.sensors import coarse_step
 from pzd.signals.cycles import MEDIAN_OF_NORMAL
@@ -57,7 +58,7 @@ def amplifier(test: PreflightRecord) -> Iterator[Finding]:
     beyond, left = min(plain.residual, without) - noise, best.residual
     if beyond < max(WORTH_OF_RANGE, chance) or left - noise >= EXPLAINS * beyond:
         return
-    if finding.check == "filter" and _rounded_yield(section) < max(left, WORTH):
+    if finding.check == "filter" and (_rounded_yield(section) < max(left, WORTH) or _late(test, section) < left):
         return
     yield finding
 
@@ -144,6 +145,11 @@ def _rounded_yield(section: Section) -> float:
     return min(shares)
 
 
+def _late(test: PreflightRecord, section: Section) -> float:
+    """Return the share of the squares left by a force that is late, and as it is otherwise."""
+    return fit_element(section, section.delayed(np.array([best_delay(test)[0]]))).residual
+
+
 def _behind(section: Section, order: int, corner: float, zooms: int = 1) -> ReferenceFit:
     """Fit the element behind a low-pass."""
     from scipy.signal import butter, lfilter, lfilter_zi  # half a second, and few records come so far
@@ -177,7 +183,7 @@ CLOSER_LIMITS = 1.15
 """Factor about the best of them within which it is looked for more closely."""
 CLOSEST = 4
 """Zooms of the grid at the best range: as many as of the reference without one."""
-CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.35)
+CUT_SHARES = (0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.34, 0.37, 0.4)
 """Shares of the samples, at either end, that may be cut off: of more, friction alone is flat too."""
 LEAST_BETWEEN = 20
 """Fewest samples between the ends, for the four columns of the reference."""

@@ -14,6 +14,7 @@ whole laws to all tests, names `sensor_delay`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,6 +35,8 @@ LEAST_RECORDS = 3
 """Records from which there is a usual offset."""
 BY_CHANCE = 0.02
 """P value below which offsets rise or fall with the speed by no chance: five in order throughout have 1/60."""
+OF_FEW = 0.34
+"""P value of three in order, 1/3: no proof, but reason enough to take nothing out as a tare."""
 LEAST_SLIP = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -78,10 +81,15 @@ def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
         return entry
     if np.ptp(offsets) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{OFFSET_MEANS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
-    elif _rise_with_speed(entries):
+    elif (chance := _in_order_of_speed(entries)) <= BY_CHANCE:
         follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
     elif usual and abs(mine + usual) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
+    elif chance <= OF_FEW and abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
+        follows = (
+            f"{usual:+.4g} N is usual in this setting; it goes with the speed of the few tests, as where rebound is "
+            "unlike compression; else a tare that changed"
+        )
     elif abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: a tare that changed; take it out of these files (fixture)"
     else:
@@ -94,15 +102,15 @@ def _offset_of(entry: RecordEntry) -> float:
     return next((finding.size for finding in entry.findings if finding.check == "offset"), 0.0)
 
 
-def _rise_with_speed(entries: list[RecordEntry]) -> bool:
-    """Whether the offsets of records rise, or fall, with the speed.
+def _in_order_of_speed(entries: list[RecordEntry]) -> float:
+    """Return the probability that the offsets of records rise, or fall, so orderly with the speed by chance.
 
     Equation: the exact probability of Kendall's tau        Source: Kendall 1938, Biometrika 30
     """
     from scipy.stats import kendalltau
 
     pairs = [(e.velocity_rms_m_per_s or 0.0, _offset_of(e)) for e in entries if _offset_of(e) != 0.0]
-    return len(pairs) > LEAST_RECORDS and bool(kendalltau(*zip(*pairs, strict=True)).pvalue <= BY_CHANCE)
+    return float(kendalltau(*zip(*pairs, strict=True)).pvalue) if len(pairs) >= LEAST_RECORDS else 1.0
 
 
 # --- Delay ---
@@ -113,6 +121,10 @@ SAMPLES = 2.0
 """and the least in samples: the flank of a rigid damper lies between two, and is known to one."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
+WORTH, ALL_BUT = 3e-4, 0.02
+"""Share of the force's squares worth a delay that leaves less than this share of it: less is how coarse the element is.
+
+Reason: on an oil spring as soft as the delay is long, 20 ms leave 1e-3, which a low-pass explains to a tenth."""
 AS_WELL = 2.0
 """A rigid damper without any delay explains the force as well where it leaves less than this times as much."""
 SIGMOIDS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
@@ -132,11 +144,12 @@ def delay(test: PreflightRecord) -> Iterator[Finding]:
     if not is_constant(test.record, voltage_scale([test.record])) or coarse_step(test.record.displacement):
         return  # what coarse steps do to the reversals passes for a delay
     section, undelayed = reference_fit(test)
-    if undelayed.residual < LEAST_RESIDUAL:
+    if undelayed.residual < WORTH:
         return
-    size, residual, at_edge = _best_delay(section, 0.5 * test.cycles.period if test.cycles else LONGEST_DELAY)
+    size, residual, at_edge = best_delay(test)
     least = max(LEAST_DELAY, SAMPLES / test.record.rate, 0.5 * section.step)
-    if abs(size) < least or residual > EXPLAINS * undelayed.residual:
+    explains = EXPLAINS if undelayed.residual >= LEAST_RESIDUAL else ALL_BUT
+    if abs(size) < least or residual > explains * undelayed.residual:
         return
     if residual_of_rigid_damper(section) >= AS_WELL * residual:
         share = 1.0 - residual / undelayed.residual
@@ -150,18 +163,19 @@ def delay(test: PreflightRecord) -> Iterator[Finding]:
         )
 
 
-def _best_delay(section: Section, longest: float) -> tuple[float, float, bool]:
-    """Search for the delay of least squares, coarsely and then closer.
+@lru_cache(maxsize=1)
+def best_delay(test: PreflightRecord) -> tuple[float, float, bool]:
+    """Search for the delay of least squares, coarsely and then closer; remembered, as the low-pass asks for it too.
 
     Parameters
     ----------
-    section : with the force at any delay
-    longest : largest delay to try, either way [s]
+    test : the record, whose force is tried at delays up to half a cycle either way
 
     Returns
     -------
     the delay [s], the share of the force's squares that it leaves, and whether it lies at the edge of the search
     """
+    section, longest = reference_fit(test)[0], 0.5 * test.cycles.period if test.cycles else LONGEST_DELAY
     step = 2.0 * longest / (TRIES - 1)
     delays = np.linspace(-longest, longest, TRIES)
     best = fit_element(section, section.delayed(delays))
