@@ -246,7 +246,7 @@ def answer(context: ReportContext) -> str:
 def told(context: ReportContext) -> tuple[str, ...]:
     """Return what a terminal says at the end: the answer, and how the rides compare, a sentence or two a line."""
     comfort = _comfort(context) if context.ridden else None
-    lines = [answer(context), *([f"{comfort.question} {comfort.answer}.", comfort.detail] if comfort else [])]
+    lines = [answer(context), *([f"{comfort.question} {sentence(comfort.answer)}", comfort.detail] if comfort else [])]
     return tuple(typewritten(line) for line in lines if line)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from pzd.report.blocks import amount, typewritten
 from pzd.report.config import ReportConfig
-from pzd.report.page import answer
+from pzd.report.page import answer, told
 from pzd.report.plots.answer import best_policy, closing, missed_loop
 
 
@@ -28,8 +28,8 @@ def context_of(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_the_sentence_names_what_is_missing_and_how_far_the_error_falls(run: Any, context_of: Any) -> None:
     """In r.m.s.: W_s goes from 0.0121 = 0.11^2 to 0.0009 = 0.03^2."""
-    told = answer(context_of(run)).replace("\xa0", " ")
-    assert told == (
+    said = answer(context_of(run)).replace("\xa0", " ")
+    assert said == (
         "The simple model lacks turbulent flow through a sharp orifice (97 % sure): with it the error on tests that no "
         "fit has seen falls from 11 % to 3 % of the force; noise alone leaves 2.8 %."
     )
@@ -52,9 +52,9 @@ def test_the_sentence_names_what_is_missing_and_how_far_the_error_falls(run: Any
     ],
 )
 def test_every_verdict_has_its_sentence(run: Any, context_of: Any, changes: dict[str, Any], said: str) -> None:
-    told = answer(context_of(run.with_diagnosis(**changes)))
-    assert told.startswith(said)
-    assert told.endswith(".")
+    shown = answer(context_of(run.with_diagnosis(**changes)))
+    assert shown.startswith(said)
+    assert shown.endswith(".")
 
 
 def test_what_the_user_says_of_the_damper_stands_in_the_head(run: Any) -> None:
@@ -118,3 +118,14 @@ def test_the_terminal_ends_with_what_the_page_begins_with_in_signs_that_it_has(r
 
 def test_without_rides_the_terminal_tells_of_the_damper_alone(run: Any) -> None:
     assert len(run.with_rides([]).told().answer) == 1
+
+
+def test_without_a_control_the_rides_are_told_in_sentences_that_end_once(
+    run: Any, context_of: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = context_of(run)
+    monkeypatch.setattr(type(context), "controlled", False)
+    _, felt, *_ = told(context)
+    assert felt.startswith("What does the passenger feel? ")
+    assert felt.endswith(".")
+    assert ".." not in felt

@@ -13,6 +13,7 @@ from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.rig.files.guess import guessed
 from pzd.schema.errors import DataError
+from tests.studies.misread_files import WAYS, Way, tried
 
 LONG = np.arange(8000) * 1e-3
 LONG_X = 0.01 * np.sin(2.0 * np.pi * 2.0 * LONG)
@@ -331,3 +332,17 @@ def test_kelvin_millivolts_and_newtons_called_kilonewtons_are_suspected(
     assert f"scale: {said}" in checks(tmp_path)
     write(tmp_path / "a.csv", lines(CANONICAL | {"temperature_degC": np.full(500, 80.0)}))
     assert checks(tmp_path) == []
+
+
+# ---------------------------------------------------------------- all ways of the study
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.told)
+def test_no_way_to_misread_a_file_is_silent(way: Way) -> None:
+    happened, _ = tried(way)
+    assert happened in ("right", "refused", "finding")
+
+
+def test_a_hundred_ways_are_tried() -> None:
+    assert len({way.told for way in WAYS}) >= 100
