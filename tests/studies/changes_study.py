@@ -10,8 +10,9 @@ third of the changed pairs the second state runs other motions; `--only` leaves 
 state is diagnosed, as the command does; `--plain` takes it as it was identified, which is four times as fast and more
 often wrong. A line a pair, then how many are right, ambiguous with the truth among the rivals, incomplete (names of the
 truth, not all of it), silent, or wrong, and how many intervals of `to` hold the true change, with Wilson's 95 %
-intervals, for equal and unlike motions apart. With `--log` what comes of each pair is added to a file, and the summary
-counts all that the file holds, so that a long study may run in pieces.
+intervals, for equal and unlike motions apart. The line tells how far `to` lies from the true change, in half intervals.
+With `--log` what comes of each pair is added to a file, and the summary counts all that the file holds, so that a long
+study may run in pieces.
 """
 
 from __future__ import annotations
@@ -181,22 +182,30 @@ def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
     return "incomplete" if found.verdict != "unchanged" else "silent"
 
 
-def held(found: Changes, drawn: Pair) -> Iterator[bool]:
-    """Yield of each named truth whether the interval of `to` holds the true change, `from` held.
+def away(found: Changes, drawn: Pair) -> Iterator[tuple[str, float]]:
+    """Yield of each named truth how far `to` lies from the true change, `from` held, in half 95 % intervals.
 
     A law that stands beside one that the first state was found to have is counted where their sizes add up.
     """
     for c in found.changes:
         given = drawn.changed.get(c.name, {})
+        if c.low95 is None or c.high95 is None:
+            continue
+        start, to, low, high = (np.atleast_1d(np.array(v, dtype=float)) for v in (c.from_, c.to, c.low95, c.high95))
         if "factor" in given:
-            start, low, high = (np.atleast_1d(np.array(each, dtype=float)) for each in (c.from_, c.low95, c.high95))
             own = np.interp(c.at_voltage_V or (drawn.base.values[0],), drawn.base.values, getattr(drawn.base, c.name))
-            yield from ((low <= (true := _moved(c.name, start, own, given["factor"]))) & (true <= high)).tolist()
-        elif c.parameter in given and isinstance(c.low95, float) and isinstance(c.high95, float):
-            before = c.from_ if isinstance(c.from_, float) else 0.0
-            absent = before == 0.0 or before == library()[c.name].parameter(c.parameter).neutral
-            if absent or c.name in ADDITIVE:
-                yield c.low95 <= given[c.parameter] + (0.0 if absent else before) <= c.high95
+            true = _moved(c.name, start, own, given["factor"])
+        elif c.parameter in given:
+            before = np.nan_to_num(start)
+            absent = np.all((before == 0.0) | (before == library()[c.name].parameter(c.parameter).neutral))
+            if not absent and c.name not in ADDITIVE:
+                continue
+            true = given[c.parameter] + (np.zeros_like(before) if absent else before)
+        else:
+            continue
+        half = np.where(to > true, to - low, high - to)
+        for value in (to - true) / np.maximum(half, np.finfo(float).tiny):
+            yield f"{c.name}.{c.parameter}", float(value)
 
 
 def _moved(name: str, start: Array, own: Array, factor: float) -> Array:
@@ -241,23 +250,25 @@ class Outcome:
     damper_named: bool
     """Whether something of the damper is listed as changed."""
     held: tuple[bool, ...]
+    """Of each named truth, whether the interval of `to` holds it."""
 
 
 def outcome(given: argparse.Namespace, index: int, drawn: Pair) -> Outcome:
     """Compare a pair, and print its line."""
     begun = time.process_time()
     found = compared(drawn, diagnosed=not given.plain)
-    verdict, holds = judged(found, drawn.changed), tuple(held(found, drawn))
+    verdict, far = judged(found, drawn.changed), list(away(found, drawn))
     names = [f"{c.name}.{c.parameter}={_short(c.to)}" for c in found.changes]
+    told = ", ".join(f"{name} {value:.2f}" for name, value in far)
     truth = {n: {k: round(v, 4) for k, v in each.items()} for n, each in drawn.changed.items()}
     motions, seconds = "equal" if drawn.equal else "unlike", time.process_time() - begun
     say(
         f"{index:4d} {motions} {verdict:18s} {found.verdict:11s} {truth} -> {names} rivals {list(found.rivals)} "
-        f"{100 * found.difference.share_of_peak:.2f} % held {list(holds)} outside {'+'.join(drawn.outside)} "
+        f"{100 * found.difference.share_of_peak:.2f} % away [{told}] outside {'+'.join(drawn.outside)} "
         f"tests {len(drawn.before)} {seconds:.0f} s"
     )
     of_damper = any(c.of == "damper" for c in found.changes)
-    return Outcome(given.seed, index, given.kind, motions, verdict, of_damper, holds)
+    return Outcome(given.seed, index, given.kind, motions, verdict, of_damper, tuple(abs(a) <= 1.0 for _, a in far))
 
 
 def summary(outcomes: Iterable[Outcome]) -> Iterator[str]:

@@ -90,6 +90,8 @@ class Coordinate:
     """Value at coordinate 0: that of the first state, or the scale of the search where that is absent."""
     absent: bool = False
     """Whether the first state has it not, so that a logarithmic coordinate of 0 is a change."""
+    added: bool = False
+    """Whether it adds to a parameter that differs by control signal, alike at all; else in proportion to it."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +190,7 @@ class FirstState:
         own = effects.setdefault(c.name, {p.name: p.neutral for p in known_effect(c.name).parameters})
         present = own.get(c.parameter, parameter.neutral)
         if isinstance(present, tuple):
-            own[c.parameter] = tuple(float(np.clip(v * (1.0 + x), parameter.low, parameter.high)) for v in present)
+            own[c.parameter] = values_by_control(c, present, x)
             return
         own[c.parameter] = parameter_value(c, x)
 
@@ -226,6 +228,13 @@ def parameter_value(c: Coordinate, x: float) -> float:
     parameter = known_parameter(c.name, c.parameter)
     value = c.start * float(np.exp(x)) if c.logarithmic else c.start + x * c.scale
     return float(np.clip(value, parameter.low, parameter.high))
+
+
+def values_by_control(c: Coordinate, before: Sequence[float], x: float) -> tuple[float, ...]:
+    """Return the values of an effect's parameter that differs by control signal at a value of its coordinate."""
+    parameter = known_parameter(c.name, c.parameter)
+    moved = (v + x * c.scale if c.added else v * (1.0 + x) for v in before)
+    return tuple(float(np.clip(v, parameter.low, parameter.high)) for v in moved)
 
 
 # --- The candidates
@@ -325,12 +334,18 @@ def _absent(first: FirstState, name: str) -> Candidate:
 
 
 def _present(first: FirstState, name: str) -> list[Candidate]:
-    """Return each parameter of an effect that the first state has, and all of them together."""
-    own, coordinates = first.damper.effects[name], []
+    """Return each parameter of an effect that the first state has, and all of them together.
+
+    One that differs by control signal may change in proportion or, as a size of force, by as much at all: what is newly
+    there beside what the first state has adds to it.
+    """
+    own, coordinates, added = first.damper.effects[name], [], []
     for p in known_effect(name).parameters:
         value = own[p.name]
         if isinstance(value, tuple):
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, 20.0))
+            if not p.search.logarithmic:
+                added.append(replace(coordinates[-1], low=-20.0, added=True))
         elif p.search.logarithmic and value > 0.0:
             limits = float(np.log(max(p.low / value, 1.0 / BOUND))), float(np.log(min(p.high / value, BOUND)))
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, value, None, *limits, True, value))
@@ -338,8 +353,9 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
             scale = p.search.scale(first.scales) or 1.0
             limits = (p.low - value) / scale, (p.high - value) / scale
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, value))
-    single = [Candidate(name, "damper", (c,), ((0.0,),)) for c in coordinates]
-    together = Candidate(name, "damper", tuple(coordinates), ((0.0,) * len(coordinates),))
+    flexible = bool(known_effect(name).never_named)
+    single = [Candidate(name, "damper", (c,), ((0.0,),), flexible=flexible) for c in (*coordinates, *added)]
+    together = Candidate(name, "damper", tuple(coordinates), ((0.0,) * len(coordinates),), flexible=flexible)
     return [*single, together] if len(coordinates) > 1 else single
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, cast
 
 import numpy as np
@@ -22,6 +23,7 @@ from pzd.diagnosis.changes.candidates import (
     element_of,
     known_parameter,
     parameter_value,
+    values_by_control,
 )
 from pzd.diagnosis.changes.pairs import (
     MOST_HARMONICS,
@@ -72,6 +74,11 @@ BEYOND_TESTED = 2.0
 """Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
 
 Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
+CROSS_STEP = 0.03
+"""Step of a coordinate of the first state over which the force of a change is differenced.
+
+Reason: such a force is often a percent of the whole, so that the tolerance of a simulation counts a hundred times as
+much as in a slope; a few percent are still a small step."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
@@ -486,7 +493,8 @@ class Findings:
         # Of a coordinate that is a logarithm of the whole size, not of its change, the error is the share itself.
         whole_sizes = np.array([c.logarithmic and c.absent for c in best.coordinates])
         missed = self._missed_of_response(best, slopes) * np.where(whole_sizes, 1.0, best.values)
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2)
+        through = self._through_first_state(best)
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2 + through**2)
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -525,6 +533,49 @@ class Findings:
         of_element = np.array([c.name in ELEMENT_COLUMNS for c in best.coordinates])
         return np.where(of_element, np.maximum(own, share), share)
 
+    @cached_property
+    def _of_first_state(self) -> tuple[tuple[Coordinate, ...], Array]:
+        """Return the (m,) coordinates of the damper of the first state, and their (m, m) covariance.
+
+        They are known but for what the damper misses, all of which may lie in any one direction of them: two that do
+        nearly the same are each known as badly as the tests tell them apart. None is open by more than its own size.
+
+        Equation: (J' J / s^2 + 1)^-1, s = share |F| / 1.96, J the slopes; r.m.s. over the tests, in units of the peaks
+        """
+        known = {*ELEMENT_COLUMNS, *self.first.damper.effects}
+        single = [c for c in self.search.candidates if c.name in known and not (c.absent or c.per_voltage)]
+        own = tuple(c.coordinates[0] for c in single if len(c.coordinates) == 1)
+        columns = self.search.regression.columns(own, np.zeros(len(own)))
+        power = np.mean([c.T @ c / each.peak**2 for c, each in zip(columns, self.comparisons, strict=True)], axis=0)
+        force = np.mean([np.sum(stacked(c.reference) ** 2) / c.peak**2 for c in self.comparisons])
+        missed = self.search.regression.likelihood.known_discrepancy**2 * force / LEVEL**2
+        return own, missed * np.linalg.inv(power + missed * np.eye(len(own))) if missed > 0.0 else np.zeros_like(power)
+
+    def _through_first_state(self, best: Fitted) -> Array:
+        """Return the (p,) standard error of coordinates by what is not known of the damper in which they changed.
+
+        An exponent of C shows only in its product with C: one that was found too small makes the change too large.
+
+        Equation: dx = -(J' J)^-1 J' (d^2 F / dx dt) x dt, of the whitened differences; t of the first state
+        """
+        regression, own = self.search.regression, self._of_first_state[0]
+        moved = [(c, float(x)) for c, x in zip(best.coordinates, best.values, strict=True) if c.of == "damper"]
+        changed, values = [c for c, _ in moved], [x for _, x in moved]
+        keys = {(c.name, c.parameter) for c in changed}
+        whiteners = regression.likelihood.whiteners(best.scatter)
+        made = regression.response.of(changed, values)
+        cross = np.zeros((regression.likelihood.size, len(own)))
+        for j, c in enumerate(own):
+            if (c.name, c.parameter) in keys:  # its change is counted from it, so that it moves with it
+                continue
+            step = CROSS_STEP if c.high > CROSS_STEP else -CROSS_STEP
+            there = regression.response.of([c, *changed], [step, *values])
+            alone = regression.response.of([c], [step])
+            differences = [(t - a - m) / step for t, a, m in zip(there, alone, made, strict=True)]
+            cross[:, j] = np.concatenate([W @ d for W, d in zip(whiteners, differences, strict=True)])
+        slopes = np.linalg.pinv(regression.jacobian(best.coordinates, best.values, whiteners)) @ cross
+        return np.asarray(np.sqrt(np.sum((slopes @ self._of_first_state[1]) * slopes, axis=1)))
+
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]
         at, start, to, low, high = self._values(mine)
@@ -560,7 +611,7 @@ class Findings:
             return self._element_values(mine)
         own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
         if isinstance(own, tuple):
-            ends = np.sort([[v * (1.0 + x + s * LEVEL * e) for v in own] for s in (-1.0, 0.0, 1.0)], axis=0)
+            ends = np.sort([values_by_control(c, own, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0)], axis=0)
             at = cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
             return at, own, tuple(ends[1].tolist()), tuple(ends[0].tolist()), tuple(ends[2].tolist())
         neutral = known_parameter(c.name, c.parameter).neutral

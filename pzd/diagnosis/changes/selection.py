@@ -52,11 +52,21 @@ class Promise:
 
 
 def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
-    """Return a start with its linear coordinates as large as the linearised step makes the difference from 0 to it."""
+    """Return a start with its linear coordinates as large as the linearised step makes the difference from 0 to it.
+
+    A force beside the element keeps its shape where all that is force in its parameters grows alike: of a branch the
+    stiffness with the force at which it slips.
+    """
     if step.size == start.size:  # no difference at the start itself
         return start
-    linear = np.array([not c.logarithmic for c in candidate.coordinates])
-    return np.where(linear, start * np.clip(step[0], *SCALED), start)
+    factor = float(np.clip(step[0], *SCALED))
+    beside = _is_beside(candidate.name)
+    return np.array(
+        [
+            x * factor if not c.logarithmic else x + np.log(factor) * (beside and c.unit.startswith("N"))
+            for c, x in zip(candidate.coordinates, start, strict=True)
+        ]
+    )
 
 
 def _is_beside(name: str) -> bool:
@@ -150,8 +160,9 @@ class Search:
         together = (*before.candidates, promise.candidate)
         return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
 
-    def _tried(self, before: Fitted) -> list[Candidate]:
-        asked = [c for c in self.candidates if self._flexible or not c.flexible]
+    def _tried(self, before: Fitted, *, present: bool = False) -> list[Candidate]:
+        """Return the candidates that are asked beside some; those that the first state has too, where they are."""
+        asked = [c for c in self.candidates if self._flexible or not c.flexible or (present and not c.absent)]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
     def _additions(self, before: Fitted, *, possible: bool = False) -> list[Fitted]:
@@ -223,7 +234,7 @@ class Search:
         """
         own = self.regression.likelihood.own_of_tests(fitted.residuals, scatter or fitted.scatter)
         squares = [
-            max(float((r - o) @ (r - o) - np.sum(c.variance)), 0.0) / c.peak**2
+            float((r - o) @ (r - o) - np.sum(c.variance)) / c.peak**2
             for r, o, c in zip(fitted.residuals, own, self.regression.comparisons, strict=True)
         ]
         return self._over_tests(squares)
@@ -282,10 +293,11 @@ class Search:
     def _over_tests(self, squares: Sequence[float]) -> float:
         """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
 
-        What the damper of the first state misses of a test that it stands for would drown what the others show.
+        What the damper of the first state misses of a test that it stands for would drown what the others show. Of
+        squares less those of noise some are below 0 by chance, as others are above, so that only their mean counts.
         """
         by_cycles = [s for s, c in zip(squares, self.regression.comparisons, strict=True) if c.before is not None]
-        return float(np.sqrt(np.mean(by_cycles or squares)))
+        return float(np.sqrt(max(float(np.mean(by_cycles or squares)), 0.0)))
 
     def _least(self, fitted: Fitted) -> float:
         """Return the r.m.s. force from which something counts, each test in units of its peak."""
@@ -372,7 +384,7 @@ class Search:
     def rivals(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
         less = self.without(best, candidate)
-        tried = [c for c in self._tried(less) if c.name != candidate.name]
+        tried = [c for c in self._tried(less, present=True) if c.name != candidate.name]
         own = self._promising(less, [candidate], best.scatter)[0]
         limit = own.criterion + self.rival_bic + SLACK
         promising = self._promising(less, tried, best.scatter)

@@ -1,0 +1,95 @@
+"""How a change is found that depends on what the first state has, and how sure its size is by what is known of that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from states import FORCE, SPEED, STROKE, campaign, drawn_damper, names, names_told, state_of
+
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.changes.candidates import candidates
+from pzd.diagnosis.changes.comparison import Findings, changes_between, findings_between
+from pzd.diagnosis.changes.selection import _scaled
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.identification.config import IdentifyConfig
+from pzd.quantities import Control
+
+
+def findings(rng: np.random.Generator, before: Damper, after: Damper, scatter: float = 0.002) -> Findings:
+    states = (
+        state_of("new", campaign(before, rng, scatter=scatter)),
+        state_of("aged", campaign(after, rng, scatter=scatter)),
+    )
+    return findings_between(*states, DiagnoseConfig(), IdentifyConfig(), Control())
+
+
+def test_an_exponent_of_the_viscous_force_is_as_open_as_the_damping_itself(rng: np.random.Generator) -> None:
+    rows = (BaseRow(voltage_V=0.0, T0_N=0.3 * FORCE, C_Ns_per_m=0.7 * FORCE / SPEED, k_N_per_m=50.0 * FORCE / STROKE),)
+    damper = Damper(base=rows)
+    damper = damper.with_effect("orifice_quadratic", {"q": 1000.0})
+    found = findings(rng, damper, damper.with_effect("shear_thinning", {"n": 0.85}))
+    thinning = next(c for c in found.search.candidates if c.name == "shear_thinning")
+    fitted = found.search.regression.fit((thinning,), np.array([-0.1]), found.best.scatter)
+    known, covariance = found._of_first_state
+    damping = [c.name for c in known].index("C")
+    # C w_r ((w/w_r)^n - w/w_r) is in proportion to C, and to 1 - n as long as that is small
+    assert found._through_first_state(fitted)[0] == pytest.approx(
+        abs(fitted.values[0]) * covariance[damping, damping] ** 0.5, rel=0.3
+    )
+    offset = next(c for c in found.search.candidates if c.name == "preload_offset")
+    beside = found.search.regression.fit((offset,), np.array([0.1]), found.best.scatter)
+    assert found._through_first_state(beside)[0] < 1e-3 * abs(beside.values[0])
+
+
+def test_a_branch_of_another_size_has_the_same_shape(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    found = findings(rng, damper, damper)
+    branch = next(c for c in found.search.candidates if c.name == "second_branch")
+    start, response = np.array(branch.starts[0]), found.search.regression.response
+    smaller = _scaled(branch, start, np.array([0.25, 0.0, 0.0]))
+    for one, other in zip(response.of(branch.coordinates, start.tolist()),
+                          response.of(branch.coordinates, smaller.tolist()), strict=True):  # fmt: skip
+        assert other == pytest.approx(0.25 * one, abs=1e-5 * FORCE)
+
+
+def test_what_is_newly_there_adds_as_much_at_every_control_signal(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    first = {"q": (500.0, 3000.0), "at_voltage_V": (0.0, 100.0)}
+    second = {"q": (2500.0, 5000.0), "at_voltage_V": (0.0, 100.0)}
+    effects = [damper.model_copy(update={"effects": {"orifice_quadratic": q}}) for q in (first, second)]
+    before, after = (state_of(n, campaign(d, rng)) for n, d in zip(("new", "aged"), effects, strict=True))
+    before = replace(before, damper=effects[0])
+    changes = changes_between(before, after, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+    assert names(changes) == ["orifice_quadratic"]
+    change = changes.changes[0]
+    assert np.asarray(change.to) - np.asarray(change.from_) == pytest.approx([2000.0, 2000.0], rel=0.1)
+    assert np.all(np.asarray(change.low95) <= second["q"])
+    assert np.all(np.asarray(change.high95) >= second["q"])
+
+
+def test_noise_alone_leaves_nothing_as_often_as_something(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    search = findings(rng, damper, damper).search
+    left = []
+    for _ in range(40):
+        noise = tuple(rng.standard_normal(c.variance.size) * np.sqrt(c.variance) for c in search.regression.comparisons)
+        left.append(search.left(replace(search.nothing(), residuals=noise)))
+    assert np.mean(np.array(left) == 0.0) > 0.4
+
+
+def test_a_part_that_no_verdict_names_is_asked_last_where_the_first_state_has_it(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng)
+    branch = {"T0_2": 0.1 * FORCE, "k_2": 5.0 * FORCE / STROKE}
+    both = [
+        damper.with_effect("second_branch", branch),
+        damper.with_effect("second_branch", {**branch, "T0_2": 0.2 * FORCE}),
+    ]
+    before, after = (state_of(n, campaign(d, rng)) for n, d in zip(("new", "aged"), both, strict=True))
+    before = replace(before, damper=both[0])
+    found = findings_between(before, after, DiagnoseConfig(), IdentifyConfig(), Control())
+    asked = candidates(found.first, found.comparisons)
+    assert all(c.flexible for c in asked if c.name == "second_branch")
+    assert not any(c.flexible for c in asked if c.name in ("T0", "C", "k"))
+    assert "second_branch" in names_told(found.changes())
