@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.parallel.on_disk import beside, let_go, one_at_a_time
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
@@ -71,7 +73,7 @@ class Record:
 def sliced(record: Record, kept: Mask) -> Record:
     """Return the record at the samples where the mask (n,) is set."""
     channels: dict[str, Any] = {
-        name: values[kept] for name, values in vars(record).items() if isinstance(values, np.ndarray)
+        name: beside(values[kept], values) for name, values in vars(record).items() if isinstance(values, np.ndarray)
     }
     return replace(record, **channels)
 
@@ -179,8 +181,12 @@ def mid_stroke(displacements: Iterable[Array]) -> float:
 
 def voltage_scale(records: Iterable[Record]) -> float:
     """Return the larger of the rig's voltage span and largest magnitude [V], without glitches; 0 without voltages."""
-    voltages = [without_glitches(record.voltage) for record in records if record.voltage is not None]
-    extremes = [(float(voltage.min()), float(voltage.max())) for voltage in voltages]
+    extremes = [
+        (float(voltage.min()), float(voltage.max()))
+        for record in one_at_a_time(records)
+        if record.voltage is not None
+        for voltage in (without_glitches(record.voltage),)
+    ]
     if not extremes:
         return 0.0
     low, high = min(e[0] for e in extremes), max(e[1] for e in extremes)
@@ -190,7 +196,7 @@ def voltage_scale(records: Iterable[Record]) -> float:
 def distinct(records: Sequence[Record]) -> tuple[Record, ...]:
     """Return the records without copies of another: a test that was saved twice says no more than once."""
     found: dict[tuple[object, ...], Record] = {}
-    for record in records:
+    for record in one_at_a_time(records):
         voltage, temperature = record.median_voltage(), record.median_temperature()
         motion = (record.displacement, record.velocity, record.force)
         samples = tuple(np.ascontiguousarray(values).tobytes() for values in motion)
@@ -223,17 +229,19 @@ def conditions(
     """
     scale = voltage_scale(records)
     within = CONSTANT_SHARE * scale if voltage_within is None else voltage_within
-    still = [r for r in records if is_constant(r, scale)]
+    still = [r for r in one_at_a_time(records) if is_constant(r, scale)]
     groups: list[tuple[str | None, list[Record]]] = []
     for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
         of_setting = [r for r in still if r.setting == setting]
-        for at_voltage in _bands(of_setting, [r.median_voltage() for r in of_setting], within):
-            bands = _bands(at_voltage, [r.median_temperature() for r in at_voltage], temperature_within)
+        for at_voltage in _bands(of_setting, [r.median_voltage() for r in one_at_a_time(of_setting)], within):
+            bands = _bands(at_voltage, [r.median_temperature() for r in one_at_a_time(at_voltage)], temperature_within)
             groups.extend((setting, members) for members in bands)
-    found = [_condition(*group, (within, temperature_within)) for group in groups]
+    found = [_condition(*group, (within, temperature_within)) for group in one_at_a_time(groups)]
     if len({each.labels for each in found}) < len(found):  # rounding has made two labels equal: round less
         found = [_condition(*group, (0.0, 0.0)) for group in groups]
-    return tuple(found), tuple(r for r in records if not is_constant(r, scale))
+    let_go()
+    constant = {id(r) for r in still}
+    return tuple(found), tuple(r for r in records if id(r) not in constant)
 
 
 def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[float, float] | None:
@@ -249,7 +257,7 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
     both [V]; None where there are several conditions, or where the voltages scatter about one
     """
     scale = voltage_scale(records)
-    voltages = [r.median_voltage() for r in records if is_constant(r, scale)]
+    voltages = [r.median_voltage() for r in one_at_a_time(records) if is_constant(r, scale)]
     known = [voltage for voltage in voltages if voltage is not None]
     spread = max(known) - min(known) if known else 0.0
     return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None

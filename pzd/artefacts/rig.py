@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Literal, Self, TypeVar
 import numpy as np
 
 from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
-from pzd.parallel.processes import parallel_map
+from pzd.parallel.on_disk import OnDisk
+from pzd.parallel.processes import parallel_each, parallel_map
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
@@ -115,7 +116,9 @@ class Rig:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        records = parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)
+        store = OnDisk()
+        each = parallel_each(lambda entry: _read_record(folder, entry, control), entries, jobs)
+        records = [store.kept(record) for record in each]
         report = folder / INGEST
         return cls(tuple(records), entries, read_json_list(report, IngestRow, control) if report.is_file() else ())
 

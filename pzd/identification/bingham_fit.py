@@ -10,7 +10,7 @@ evolutionary method stands for the paper's genetic algorithm. Both end in least 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,7 +22,8 @@ from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.fit.element_coordinates import LARGEST, LARGEST_PRE_SLIP, ElementCoordinates
 from pzd.fit.least_squares import minimise
 from pzd.identification.config import EvolutionaryConfig
-from pzd.identification.prepared_record import PreparedRecord
+from pzd.identification.prepared_record import PreparedRecord, split_by_record
+from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import Array
 
 # --- Criterion and search coordinates ---
@@ -51,7 +52,7 @@ class Objective:
     @cached_property
     def measured(self) -> Array:
         """Measured force (N,) at the counted samples, record by record [N]."""
-        return np.concatenate([t.force[t.counted] for t in self.prepared])
+        return np.concatenate([t.force[t.counted] for t in one_at_a_time(self.prepared)])
 
     @cached_property
     def energy(self) -> float:
@@ -68,7 +69,7 @@ class Objective:
         return np.concatenate(
             [
                 t.at_counted(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
-                for t in self.prepared
+                for t in one_at_a_time(self.prepared)
             ]
         )
 
@@ -83,20 +84,60 @@ class Objective:
 
     def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
         """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and 1/k."""
-        first, forces, slopes = 0, np.empty(sum(self.lengths)), np.empty((sum(self.lengths), 3))
-        for t, length in zip(self.prepared, self.lengths, strict=True):
+        forces, slopes = np.empty(sum(self.lengths)), np.empty((sum(self.lengths), 3))
+        for rows, force, slope in self._by_record(parameters):
+            forces[rows], slopes[rows] = force, slope
+        return forces, slopes
+
+    def _by_record(self, parameters: Bingham) -> Iterator[tuple[slice, Array, Array]]:
+        """Yield the rows of each record, its force (m,) and the derivatives (m, 3) of that at the counted samples."""
+        first = 0
+        for t, length in one_at_a_time(zip(self.prepared, self.lengths, strict=True)):
             force, slope = element_force_sensitivities(
                 t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
             )
-            rows = slice(first, first + length)
-            forces[rows], slopes[rows] = t.at_counted(force), t.at_counted(slope)
+            yield slice(first, first + length), t.at_counted(force), t.at_counted(slope)
             first += length
-        return forces, slopes
+
+    def fitted_by_record(self, parameters: Bingham) -> Iterator[tuple[Array, Array]]:
+        """Yield the residuals (m,) and sensitivities (m, 3) of each record, as of `residuals_and_slopes`."""
+        if self.basis is not None:
+            yield from split_by_record(self.prepared, *self.residuals_and_slopes(parameters))
+            return
+        for rows, force, slope in self._by_record(parameters):
+            weight = 1.0 if self._all_count else self.weight[rows]
+            yield (self.measured[rows] - force) * weight, slope * np.reshape(weight, (-1, 1))
+
+    def triangle(self, parameters: Bingham, turned: Array, *, measured: bool = False) -> Array:
+        """Return the triangle (q + 1, q + 1) with the inner products of the q slopes along directions, and residuals.
+
+        Least squares on so few rows takes the same steps as on N rows, and costs next to nothing. Triangles of so many
+        rows as lie in the cache of a processor are made first, and one of all of them: no more than a record is held.
+
+        Parameters
+        ----------
+        parameters : at which
+        turned : (3, q) derivatives of T0, C and 1/k along the directions
+        measured : whether the measured forces take the place of the residuals
+        """
+        triangles = []
+        for rows, force, slope in self._by_record(parameters):
+            left = self.measured[rows] if measured else self.measured[rows] - force
+            together = np.vstack([turned.T @ slope.T, left])
+            if not self._all_count:
+                together *= self.weight[rows]
+            if self.basis is not None:
+                together = np.vstack([self.basis[rows].T, together])
+            pieces = (together[:, n : n + _ROWS_AT_A_TIME] for n in range(0, together.shape[1], _ROWS_AT_A_TIME))
+            triangles += [np.linalg.qr(piece.T, mode="r") for piece in pieces]
+        # What stands behind the columns of the basis is orthogonal to them.
+        beside = 0 if self.basis is None else self.basis.shape[1]
+        return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))[beside:, beside:]
 
     @cached_property
     def weight(self) -> Array:
         """Weight (N,) of the counted samples: 0 beside an unresolved jump of the force, else 1."""
-        return np.concatenate([t.weight[t.counted] for t in self.prepared])
+        return np.concatenate([t.weight[t.counted] for t in one_at_a_time(self.prepared)])
 
     @cached_property
     def _all_count(self) -> bool:
@@ -119,8 +160,8 @@ class Objective:
     @cached_property
     def scales(self) -> tuple[float, float, float]:
         """Peak force [N], peak speed [m/s] and range of displacement [m] over the records."""
-        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.prepared)
-        stroke = max(float(np.ptp(t.displacement)) for t in self.prepared)
+        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in one_at_a_time(self.prepared))
+        stroke = max(float(np.ptp(t.displacement)) for t in one_at_a_time(self.prepared))
         return float(np.max(np.abs(self.measured))), speed, stroke
 
     @cached_property
@@ -153,14 +194,21 @@ class Objective:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An optimum of the criterion."""
+    """An optimum of the criterion. Residuals and slopes of many records are large: they are computed when asked for."""
 
     parameters: Bingham
     criterion: float
-    residuals: Array
-    """(N,) measured less simulated force at the counted samples [N]."""
-    slopes: Array
-    """(N, 3) derivatives of the simulated force by T0, C and 1/k."""
+    objective: Objective
+
+    @property
+    def residuals(self) -> Array:
+        """Measured less simulated force (N,) at the counted samples [N]."""
+        return self.objective.residuals(self.parameters)
+
+    @property
+    def slopes(self) -> Array:
+        """Derivatives (N, 3) of the simulated force by T0, C and 1/k."""
+        return self.objective.residuals_and_slopes(self.parameters)[1]
 
 
 # --- Start from the characteristic, as in the first stage of the paper ---
@@ -202,7 +250,7 @@ def graphical_start(prepared: Sequence[PreparedRecord]) -> Bingham:
 def _flank(prepared: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
     """Return speed, deceleration, and force along the direction of motion, on the slip flank."""
     parts = []
-    for t in prepared:
+    for t in one_at_a_time(prepared):
         velocity = t.at_samples(np.gradient(t.displacement, t.step))
         step = t.step * (t.displacement.size - 1) / (t.force.size - 1)
         speed = np.abs(velocity)
@@ -217,7 +265,7 @@ def _flank(prepared: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
 def _pre_slip_slope(prepared: Sequence[PreparedRecord], friction: float) -> float:
     """Return the slope of force over displacement where the force passes through zero, pooled over all passages."""
     covariance = variance = 0.0
-    for t in prepared:
+    for t in one_at_a_time(prepared):
         displacement = t.at_samples(t.displacement)[t.counted]
         force = t.force[t.counted]
         for part in _runs(np.abs(force) < PRE_SLIP_FORCE * friction):
@@ -226,7 +274,7 @@ def _pre_slip_slope(prepared: Sequence[PreparedRecord], friction: float) -> floa
             variance += float(dx @ dx)
     if covariance > 0.0:
         return covariance / variance
-    stroke = max(float(np.ptp(t.displacement)) for t in prepared)
+    stroke = max(float(np.ptp(t.displacement)) for t in one_at_a_time(prepared))
     return 20.0 * friction / stroke
 
 
@@ -279,9 +327,9 @@ def fit_rigid(objective: Objective) -> Fit:
     from scipy.optimize import nnls
 
     force, speed, _ = objective.scales
-    slopes = objective.residuals_and_slopes(Bingham(force, force / speed, np.inf))[1]
-    terms = slopes[:, :2] * (force, force / speed)
-    friction, damping = nnls(terms, objective.projected(objective.measured))[0]
+    units = np.diag([force, force / speed, 0.0])[:, :2]
+    triangle = objective.triangle(Bingham(force, force / speed, np.inf), units, measured=True)
+    friction, damping = nnls(triangle[:, :2], triangle[:, 2])[0]
     return _fit_at(objective, Bingham(float(friction) * force, float(damping) * force / speed, np.inf))
 
 
@@ -295,7 +343,7 @@ def grid_starts(objective: Objective) -> list[Bingham]:
     Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
     """
     _, _, stroke = objective.scales
-    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.prepared)) for t in objective.prepared]
+    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.prepared)) for t in one_at_a_time(objective.prepared)]
     slowest = max((t.displacement.size - 1) * t.step for t in objective.prepared)
     deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, DEFLECTION_AND_TIME_GRID[0]) * stroke
     taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, DEFLECTION_AND_TIME_GRID[1])
@@ -326,21 +374,7 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     norm = np.sqrt(objective.energy)
     begin, high = objective.to_search(start), objective.coordinates.high
 
-    def reduced(fit: Fit, x: Array) -> Array:
-        """Return the triangle (4, 4) with the inner products of slopes and residuals.
-
-        Least squares on four rows takes the same steps as on N rows, and costs next to nothing. Triangles of so many
-        rows as lie in the cache of a processor are made first, and one of all of them.
-        """
-        turned, triangles = -objective.coordinates.slopes(x).T / norm, []
-        for first in range(0, fit.residuals.size, _ROWS_AT_A_TIME):
-            rows = slice(first, first + _ROWS_AT_A_TIME)
-            together = np.vstack([turned @ fit.slopes[rows].T, fit.residuals[None, rows] / norm])
-            triangles.append(np.linalg.qr(together.T, mode="r"))
-        return np.asarray(np.linalg.qr(np.concatenate(triangles), mode="r"))
-
     memory: dict[bytes, tuple[float, Array]] = {}
-    least: list[tuple[bytes, Fit]] = []
 
     def placed(moved: Array) -> tuple[Array, bytes]:
         x = np.concatenate([moved, begin[free:]])
@@ -349,10 +383,8 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     def at(moved: Array) -> tuple[float, Array]:
         x, key = placed(moved)
         if key not in memory:
-            fit = _fit_at(objective, objective.from_search(x))
-            memory[key] = fit.criterion, reduced(fit, x)
-            if not least or fit.criterion <= least[0][1].criterion:
-                least[:] = [(key, fit)]  # of the other points the triangle is enough: a search ends at the least
+            triangle = objective.triangle(objective.from_search(x), -objective.coordinates.slopes(x)) / norm
+            memory[key] = float(triangle[:, 3] @ triangle[:, 3]), triangle
         return memory[key]
 
     def residuals_at(x: Array) -> Array:
@@ -373,8 +405,8 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
         evaluations=EVALUATIONS,
         size=objective.measured.size,
     )
-    x, key = placed(found.x)
-    return _settled(objective, x, least[0][1] if least[0][0] == key else _fit_at(objective, objective.from_search(x)))
+    x, _ = placed(found.x)
+    return _settled(objective, x, Fit(objective.from_search(x), at(found.x)[0], objective))
 
 
 def _settled(objective: Objective, x: Array, found: Fit) -> Fit:
@@ -387,9 +419,9 @@ def _settled(objective: Objective, x: Array, found: Fit) -> Fit:
 
 
 def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
-    """Evaluate residuals and sensitivities at parameters."""
-    residuals, slopes = objective.residuals_and_slopes(parameters)
-    return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
+    """Evaluate the criterion at parameters."""
+    (left,) = objective.triangle(parameters, np.empty((3, 0)))[:, 0]
+    return Fit(parameters, float(left**2) / objective.energy, objective)
 
 
 def _coarse_record(record: PreparedRecord, samples: int) -> tuple[Array, float, Array, int]:

@@ -19,9 +19,10 @@ from pzd.identification import trust
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_evolutionary, fit_separable
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
-from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare
+from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare, split_by_record
 from pzd.identification.stiffness import settle_stiffness
 from pzd.identification.trust import ParameterEvidence
+from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
 from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
@@ -44,9 +45,9 @@ def identify_condition(
     records = [test for record in condition.records for test in separate_tests(record)]
     objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
     fit, stiffest = settle_stiffness(records, objective, fit, config.nuisance)
-    fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance)
-    optimum = [(condition.labels, fit.parameters)]
-    (row,) = parameter_rows(objective, optimum, (fit.residuals, fit.slopes), fitted, stiffest=stiffest)
+    by_record = objective.fitted_by_record(fit.parameters)
+    fitted = fitted_records(records, objective.prepared, by_record, config.nuisance)
+    (row,) = parameter_rows(objective, [(condition.labels, fit.parameters)], fitted, stiffest=stiffest)
     return row, None if auxiliary is None else _auxiliary_row(condition.labels, auxiliary)
 
 
@@ -65,7 +66,7 @@ def fit_with_auxiliary(
     -------
     the data as fitted, the optimum, and the forces beside the element; None where there are none
     """
-    whole = Objective(tuple(prepare(r) for r in records))
+    whole = Objective(tuple(prepare(r) for r in one_at_a_time(records)))
     element_alone = _optimum(whole, config, seed)
     if not auxiliary_is_visible(whole, element_alone):
         return whole, element_alone, None
@@ -93,7 +94,6 @@ def _optimum(objective: Objective, config: IdentifyConfig, seed: int) -> Fit:
 def parameter_rows(
     objective: Objective,
     optimum: Sequence[tuple[Labels, Bingham]],
-    fitted: tuple[Array, Array],
     records: Sequence[FittedRecord],
     touched: Mask | None = None,
     stiffest: float | None = None,
@@ -104,19 +104,20 @@ def parameter_rows(
     ----------
     objective : the data
     optimum : labels and parameters of each row
-    fitted : (N,) residuals and (N, 3 rows) slopes
-    records : the same by record
+    records : with residuals (m,) and slopes (m, 3 rows)
     touched : (N, rows) samples on which each row is judged; None for all
     stiffest : stiffness from which on the tests do not tell k from infinity [N/m]; None where it was not looked for
     """
-    residuals, slopes = fitted
     misfit = trust.misfit_of(records)
-    noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
+    noise = uncertainty([(r.slopes, r.residuals) for r in records]).half_widths().reshape(-1, 3)
     widths = half_widths(records, misfit).reshape(-1, 3)
     whole, speed = objective.measured, objective.scales[1]
     scales = np.stack([trust.parameter_scales(p, w, whole, speed) for (_, p), w in zip(optimum, widths, strict=True)])
-    shares = trust.partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
-    cosines = trust.stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
+    gram = np.sum([r.slopes.T @ r.slopes for r in one_at_a_time(records)], axis=0)
+    pull = np.sum([r.slopes.T @ r.residuals for r in one_at_a_time(records)], axis=0)
+    shares = trust.partial_sensitivities(gram, scales.ravel(), objective.energy).reshape(-1, 3)
+    residuals = np.concatenate([r.residuals for r in one_at_a_time(records)])
+    cosines = trust.stationarity(gram, pull, float(residuals @ residuals), objective.energy).reshape(-1, 3)
     rows = []
     for i, (labels, parameters) in enumerate(optimum):
         here = touched[:, i] if touched is not None and np.any(touched[:, i]) else slice(None)
@@ -189,18 +190,25 @@ class Auxiliary:
 
 def auxiliary_columns(objective: Objective) -> tuple[Array, float]:
     """Return the forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the samples that weigh, and the mid-stroke [m]."""
-    middle = mid_stroke(t.displacement for t in objective.prepared)
-    x = np.concatenate([t.at_samples(t.displacement)[t.counted] for t in objective.prepared]) - middle
+    middle = mid_stroke(t.displacement for t in one_at_a_time(objective.prepared))
+    counted = [t.at_samples(t.displacement)[t.counted] for t in one_at_a_time(objective.prepared)]
+    x = np.concatenate(counted) - middle
     return np.column_stack([np.ones(x.size), x]) * objective.weight[:, None], middle
 
 
 def auxiliary_is_visible(objective: Objective, fit: Fit) -> bool:
     """Tell whether the forces would explain, to first order, more than a load cell may be wrong by."""
     columns, _ = auxiliary_columns(objective)
-    slopes = fit.slopes / np.maximum(np.linalg.norm(fit.slopes, axis=0), np.finfo(float).tiny)
-    base, _ = np.linalg.qr(slopes)
-    beyond, _ = np.linalg.qr(columns - base @ (base.T @ columns))
-    explained = float(np.sum((beyond.T @ fit.residuals) ** 2)) / fit.residuals.size
+    triangles, first = [], 0
+    for residuals, slopes in objective.fitted_by_record(fit.parameters):
+        own = columns[first : first + residuals.size]
+        triangles.append(np.linalg.qr(np.column_stack([slopes, own, residuals]), mode="r"))
+        first += residuals.size
+    few = np.concatenate(triangles)  # with the inner products of all samples
+    size = np.linalg.norm(few[:, :3], axis=0)
+    base, _ = np.linalg.qr(few[:, :3][:, size > 0.0] / size[size > 0.0])
+    beyond, _ = np.linalg.qr(few[:, 3:5] - base @ (base.T @ few[:, 3:5]))
+    explained = float(np.sum((beyond.T @ few[:, 5]) ** 2)) / first
     return bool(np.sqrt(explained) > trust.MISFIT_THRESHOLD * objective.scales[0])
 
 
@@ -251,7 +259,8 @@ def significant_auxiliary(
     """
     columns, middle = auxiliary_columns(objective)
     slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1] * objective.weight[:, None], columns])
-    fitted = fitted_records(records, objective.prepared, (fit.residuals, slopes), nuisance)
+    by_record = split_by_record(objective.prepared, fit.residuals, slopes)
+    fitted = fitted_records(records, objective.prepared, by_record, nuisance)
     misfit = trust.misfit_of(fitted)
     if not np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]):
         return None

@@ -19,8 +19,9 @@ import numpy as np
 
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
+from pzd.parallel.on_disk import beside, one_at_a_time
 from pzd.record import Array, Labels
-from pzd.signals.measures import reversals, rms
+from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, all_pole, autoregression
 
 TURNS_PER_STRETCH = 4
@@ -67,11 +68,12 @@ def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 
     """
     from scipy.special import stdtrit
 
-    size = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in records))
+    size = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in one_at_a_time(records)))
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
-    slopes = [r.slopes / size for r in records]
-    bread: Array = np.linalg.pinv(np.sum([s.T @ s for s in slopes], axis=0), rcond=1e-14, hermitian=True)
+    slopes = [beside(r.slopes / size, r.record.force) for r in one_at_a_time(records)]
+    grams = [s.T @ s for s in one_at_a_time(slopes)]
+    bread: Array = np.linalg.pinv(np.sum(grams, axis=0), rcond=1e-14, hermitian=True)
     noise = _noise_variance(records, slopes, bread)
     sensors = _sensor_variance(records, slopes, bread, noise)
     samples = sum(r.residuals.size for r in records)
@@ -100,12 +102,12 @@ def _noise_variance(records: Sequence[FittedRecord], slopes: Sequence[Array], br
     """Return the variance by noise: of the scatter between cycles, or between stretches."""
     nothing = _Variance(np.zeros(len(bread)), np.full(len(bread), np.inf))
     terms, stretches, repeating = [nothing], [], []
-    for record, slope in zip(records, slopes, strict=True):
+    for record, slope in one_at_a_time(zip(records, slopes, strict=True)):
         if np.any(record.number >= 0):
             repeating.append((record, slope))
         else:
             stretches += _stretches(record, slope)
-    terms += [_between_cycles(record, slope, bread) for record, slope in repeating]
+    terms += [_between_cycles(record, slope, bread) for record, slope in one_at_a_time(repeating)]
     if stretches:
         terms.append(_between_stretches(stretches, bread))
     return _sum_of_variances(terms)
@@ -178,9 +180,9 @@ def _sensor_variance(
                                         Source: Bell and McCaffrey 2002 for R and n; L a weighted mean
     """
     count = len(bread)
-    given = [(s.T @ r.nuisances) for s, r in zip(slopes, records, strict=True)]
-    grams = [s.T @ s for s in slopes]
-    pulls = np.stack([(s.T @ r.residuals) @ bread for s, r in zip(slopes, records, strict=True)])
+    given = [(s.T @ r.nuisances) for s, r in one_at_a_time(zip(slopes, records, strict=True))]
+    grams = [s.T @ s for s in one_at_a_time(slopes)]
+    pulls = np.stack([(s.T @ r.residuals) @ bread for s, r in one_at_a_time(zip(slopes, records, strict=True))])
     prior = np.sum([(g.T @ bread) ** 2 for g in given], axis=(0, 1))
     if len(records) < 2:
         return _Variance(prior, np.full(count, np.inf))
@@ -221,14 +223,19 @@ def _hidden_law_variance(records: Sequence[FittedRecord], slopes: Sequence[Array
     One sine shows hardly a tenth of it: C absorbs the rest, four times the residual in force. Tests at several speeds
     show more, and less of it can hide.
     """
-    # The slope by C is the speed of the flow; where the control signal moves, every node has a C: use the rod's speed.
-    speeds = [r.slopes[:, 1] if r.constant else r.record.velocity[r.counted] for r in records]
-    squares = [v * np.abs(v) for v in speeds]
-    taken = bread @ np.sum([s.T @ g for s, g in zip(slopes, squares, strict=True)], axis=0)
-    peaks = [float(np.max(np.abs(r.force))) for r in records]
-    left = [(g - s @ taken) / peak for s, g, peak in zip(slopes, squares, peaks, strict=True)]
-    whole = [g / peak for g, peak in zip(squares, peaks, strict=True)]
-    rms_left, rms_whole = (rms(np.concatenate(each)) for each in (left, whole))
+
+    def hidden(record: FittedRecord) -> Array:
+        # The slope by C is the speed of the flow; where the control signal moves, every node has a C: use the rod's.
+        v = record.slopes[:, 1] if record.constant else record.record.velocity[record.counted]
+        return np.asarray(v * np.abs(v))
+
+    taken = bread @ np.sum([s.T @ hidden(r) for s, r in one_at_a_time(zip(slopes, records, strict=True))], axis=0)
+    squares, samples = np.zeros(2), 0
+    for s, r in one_at_a_time(zip(slopes, records, strict=True)):
+        whole, peak = hidden(r), float(np.max(np.abs(r.force)))
+        squares += [float(np.sum((each / peak) ** 2)) for each in (whole - s @ taken, whole)]
+        samples += whole.size
+    rms_left, rms_whole = np.sqrt(squares / samples).tolist()
     size = min(HIDDEN_FORCE / max(rms_left, 1e-12 * rms_whole), HIDDEN_FORCE_LIMIT / rms_whole)
     return np.asarray((taken * size) ** 2)
 
@@ -259,39 +266,37 @@ class Uncertainty:
         return quantile * np.sqrt(np.diag(self.covariance))
 
 
-def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Uncertainty:
+def uncertainty(records: Sequence[tuple[Array, Array]]) -> Uncertainty:
     """Compute the covariance of a least-squares estimate whose residuals are correlated within each record.
 
     Equation: cov = (J'J)^-1 J' Omega J (J'J)^-1,  Omega = s2 A^-1 A^-T      Source: Box and Jenkins 1976, ch. 7
 
     Parameters
     ----------
-    slopes : (N, p) J, derivatives of the model by the parameters
-    residuals : (N,) measured less model
-    lengths : samples of each record, in order; their sum is N
+    records : (m, p) J, derivatives of the model by the parameters, and (m,) measured less model, of each
 
     Returns
     -------
     covariance with the small-sample factor N / (N - p), and degrees of freedom
     """
-    size = np.linalg.norm(slopes, axis=0)
+    size = np.sqrt(np.sum([np.sum(slopes**2, axis=0) for slopes, _ in one_at_a_time(records)], axis=0))
     unseen = size == 0.0
     size[unseen] = 1.0
-    scaled = slopes / size
-    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
-    meat = np.zeros((slopes.shape[1],) * 2)
-    independent, start = 0.0, 0
-    for length in lengths:
-        rows = slice(start, start + length)
-        noise = autoregression([residuals[rows]], LARGEST_ORDER)
-        filtered = all_pole(noise.whitening_filter, scaled[rows][::-1])
+    bread, meat = np.zeros((size.size,) * 2), np.zeros((size.size,) * 2)
+    independent, samples = 0.0, 0
+    for slopes, residuals in one_at_a_time(records):
+        scaled = slopes / size
+        noise = autoregression([residuals], LARGEST_ORDER)
+        filtered = all_pole(noise.whitening_filter, scaled[::-1])
+        bread += scaled.T @ scaled
         meat += noise.innovation * filtered.T @ filtered
-        independent += length * _independent_share(noise)
-        start += length
-    small_sample = start / max(start - slopes.shape[1], 1)
+        independent += residuals.size * _independent_share(noise)
+        samples += residuals.size
+    bread = np.linalg.pinv(bread, rcond=1e-14, hermitian=True)
+    small_sample = samples / max(samples - size.size, 1)
     covariance = small_sample * bread @ meat @ bread / np.outer(size, size)
     covariance[unseen, unseen] = np.inf
-    return Uncertainty(covariance, independent - slopes.shape[1])
+    return Uncertainty(covariance, independent - size.size)
 
 
 def _independent_share(noise: Autoregression) -> float:

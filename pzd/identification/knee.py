@@ -28,7 +28,7 @@ from pzd.identification.knee_fit import (
     fit_knee,
     without_gas,
 )
-from pzd.identification.prepared_record import fitted_records, prepare
+from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
 from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
@@ -243,7 +243,10 @@ def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tup
         forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
     records = [test.record for test in tests.tests]
     prepared = [prepare(record) for record in records]
-    fitted = [fitted_records(records, prepared, (fit.residuals, s), nuisance) for s in (fit.slopes, by_force)]
+    fitted = [
+        fitted_records(records, prepared, split_by_record(prepared, fit.residuals, slopes), nuisance)
+        for slopes in (fit.slopes, by_force)
+    ]
     # Records that are not constant use the speed of the rod for that of the flow: here no single C stands for it.
     widths, of_force = (half_widths([replace(r, constant=False) for r in each], NO_MISFIT) for each in fitted)
     by_column = dict(zip(forces, of_force.tolist(), strict=True)) | dict(zip(columns, widths.tolist(), strict=True))

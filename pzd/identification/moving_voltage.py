@@ -24,7 +24,7 @@ from pzd.identification import bingham_fit
 from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
 from pzd.identification.condition import parameter_rows
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.prepared_record import fitted_records, prepare
+from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, Rows, conditions, voltage_scale
 from pzd.schema.errors import ConfigError
 from pzd.signals.jumps import denoised_control
@@ -120,9 +120,10 @@ def _fit_band(
     slopes = objective.slopes(free, residuals)
     prepared = objective.constant.prepared
     # Where the voltage moves nothing repeats, and no lack of fit is judged.
-    fitted = fitted_records(objective.records, prepared, (residuals, slopes), config.nuisance, constant=False)
+    by_record = split_by_record(prepared, residuals, slopes)
+    fitted = fitted_records(objective.records, prepared, by_record, config.nuisance, constant=False)
     optimum, touched = list(zip(labels, free, strict=True)), objective.touched()[:, objective.free] > 0.0
-    return parameter_rows(objective.constant, optimum, (residuals, slopes), fitted, touched)
+    return parameter_rows(objective.constant, optimum, fitted, touched)
 
 
 def _starting_values(objective: MovingObjective, band: float) -> list[Bingham]:

@@ -8,13 +8,14 @@ warm-up is left out of the criterion; so is the rest behind the motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.parallel.on_disk import beside, one_at_a_time
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles, cycles_of
 from pzd.signals.jumps import jumps, jumps_in_cycles, unresolved_flanks
@@ -87,12 +88,15 @@ def prepare(record: Record) -> PreparedRecord:
     return PreparedRecord(
         record.name,
         # Without its noise, which a stiff oil spring would turn into force.
-        _on_fine_grid(clean_displacement_of(record), record, time, even=positions is None),
+        beside(_on_fine_grid(clean_displacement_of(record), record, time, even=positions is None), record.displacement),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
         in_motion(record),
-        np.where(unresolved_flanks(record.force, reversals(record.displacement), record.rate), 0.0, 1.0),
+        beside(
+            np.where(unresolved_flanks(record.force, reversals(record.displacement), record.rate), 0.0, 1.0),
+            record.force,
+        ),
         positions,
     )
 
@@ -192,7 +196,7 @@ class FittedRecord:
             return np.full(self.residuals.size, -1)
         place = np.full(self.run.count + 1, -1)  # the last entry serves samples outside the run, whose index is -1
         place[self.whole_cycles] = np.arange(len(self.whole_cycles))
-        return np.asarray(place[self.run.number(self.record.time)][self.counted])
+        return beside(np.asarray(place[self.run.number(self.record.time)][self.counted]), self.record.force)
 
     @cached_property
     def calm(self) -> NDArray[np.bool_]:
@@ -210,33 +214,38 @@ class FittedRecord:
         return self.run.fold(self.record.time, everywhere)[self.whole_cycles]
 
 
+def split_by_record(
+    prepared: Sequence[PreparedRecord], residuals: Array, slopes: Array
+) -> Iterator[tuple[Array, Array]]:
+    """Yield the residuals (m,) and slopes (m, p) of each record of (N,) and (N, p) of the counted samples of all."""
+    ends = np.cumsum([np.count_nonzero(each.counted) for each in prepared])[:-1]
+    yield from zip(np.split(residuals, ends), np.split(slopes, ends), strict=True)
+
+
 def fitted_records(
     records: Sequence[Record],
     prepared: Sequence[PreparedRecord],
-    fitted: tuple[Array, Array],
+    fitted: Iterable[tuple[Array, Array]],
     nuisance: NuisanceConfig,
     *,
     constant: bool = True,
 ) -> tuple[FittedRecord, ...]:
-    """Split the residuals and sensitivities of a fit by record.
+    """Put the residuals and sensitivities of a fit beside the records.
 
     Parameters
     ----------
     records : that were fitted
     prepared : the same, prepared
-    fitted : (N,) residuals and (N, p) slopes of the counted samples, record by record
+    fitted : (m,) residuals and (m, p) slopes of the counted samples of each record
     nuisance : standard deviations of what differs from test to test
     constant : whether the control signal is constant, so that the force repeats where the motion does
     """
-    residuals, slopes = fitted
-    ends = np.cumsum([np.count_nonzero(each.counted) for each in prepared])[:-1]
     found = []
-    for record, each, left, slope in zip(
-        records, prepared, np.split(residuals, ends), np.split(slopes, ends), strict=True
-    ):
+    for record, each, (one, slopes) in one_at_a_time(zip(records, prepared, fitted, strict=True)):
         counted = each.counted
-        nuisances = nuisance_columns(record.force[counted] - left, record.rate, nuisance, counted)
+        nuisances = nuisance_columns(record.force[counted] - one, record.rate, nuisance, counted)
         nuisances *= each.weight[counted, None]
         run = cycles_of(record) if constant else None
+        left, slope, nuisances = (beside(values, record.force) for values in (one, slopes, nuisances))
         found.append(FittedRecord(record, counted, left, slope, nuisances, run, constant))
     return tuple(found)

@@ -15,7 +15,7 @@ import numpy as np
 from pzd.fit.element_coordinates import HARDLY_ELASTIC
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_rigid
 from pzd.identification.intervals import half_widths
-from pzd.identification.prepared_record import fitted_records
+from pzd.identification.prepared_record import fitted_records, split_by_record
 from pzd.identification.trust import EXACT_FIT, Misfit
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -69,13 +69,15 @@ def _rejected(records: Sequence[Record], objective: Objective, best: Fit, other:
 
     Equation: F_a = F_best + a (F_other - F_best); |1 - a^| > h, a^ and its half width h beside T0 and C
     """
-    change = best.residuals - other.residuals
-    if not np.any(change):
-        return False
     if other.criterion > MUCH_WORSE * best.criterion and other.criterion > EXACT_FIT:
         return True
-    columns = np.column_stack([best.slopes[:, :2], change])
+    residuals, slopes = objective.residuals_and_slopes(best.parameters)
+    change = residuals - other.residuals
+    if not np.any(change):
+        return False
+    columns = np.column_stack([slopes[:, :2], change])
     size = np.linalg.norm(columns, axis=0)
-    amplitude = np.linalg.lstsq(columns / np.where(size > 0.0, size, 1.0), best.residuals, rcond=1e-12)[0][2] / size[2]
-    fitted = fitted_records(records, objective.prepared, (best.residuals, columns), nuisance)
+    amplitude = np.linalg.lstsq(columns / np.where(size > 0.0, size, 1.0), residuals, rcond=1e-12)[0][2] / size[2]
+    by_record = split_by_record(objective.prepared, residuals, columns)
+    fitted = fitted_records(records, objective.prepared, by_record, nuisance)
     return bool(abs(1.0 - amplitude) > half_widths(fitted, Misfit(0.0, 0.0))[2])

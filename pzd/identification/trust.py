@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective
 from pzd.identification.prepared_record import FittedRecord
+from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
@@ -205,14 +206,14 @@ def parameter_scales(parameters: Bingham, widths: Array, measured: Array, speed:
     return np.array([friction_scale(friction, measured), max(damping, least), 1.0 / stiffness])
 
 
-def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
+def partial_sensitivities(gram: Array, scales: Array, energy: float) -> Array:
     """Compute the sensitivity of the force to each parameter that no other parameter can replace.
 
     Equation: s_j = scale_j / sqrt([(J'J)^-1]_jj sum F^2)      Source: partial regression
 
     Parameters
     ----------
-    slopes : (N, p) J, derivatives of the force by the parameters
+    gram : (p, p) J'J of the derivatives of the force by the parameters
     scales : (p,) change of each parameter
     energy : sum of F^2 over the samples concerned [N2]
 
@@ -220,10 +221,9 @@ def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
     -------
     (p,) shares of the r.m.s. force, 0 where the slopes are linearly dependent
     """
-    scaled = slopes * scales
-    size = np.linalg.norm(scaled, axis=0)
-    unit = scaled / np.where(size > 0.0, size, 1.0)
-    gram = unit.T @ unit
+    size = np.sqrt(np.diag(gram)) * np.abs(scales)
+    unit = scales / np.where(size > 0.0, size, 1.0)
+    gram = gram * np.outer(unit, unit)
     shares = np.zeros(size.size)
     for j in range(size.size):
         others = np.delete(np.arange(size.size), j)
@@ -232,12 +232,20 @@ def partial_sensitivities(slopes: Array, scales: Array, energy: float) -> Array:
     return np.asarray(shares / np.sqrt(energy))
 
 
-def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
-    """Compute the cosine (p,) between the residuals and each slope, which is 0 at an optimum."""
-    size = np.linalg.norm(slopes, axis=0) * np.sqrt(residuals @ residuals)
-    if float(residuals @ residuals) <= EXACT_FIT * energy:
+def stationarity(gram: Array, pull: Array, squares: float, energy: float) -> Array:
+    """Compute the cosine (p,) between the residuals and each slope, which is 0 at an optimum.
+
+    Parameters
+    ----------
+    gram : (p, p) J'J of the slopes
+    pull : (p,) J'r
+    squares : r'r [N2]
+    energy : sum of F^2 over the samples concerned [N2]
+    """
+    size = np.sqrt(np.diag(gram) * squares)
+    if squares <= EXACT_FIT * energy:
         return np.zeros(size.size)
-    return np.asarray(np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0))
+    return np.asarray(np.abs(pull) / np.where(size > 0.0, size, 1.0))
 
 
 def displacement_noise(displacement: Array) -> float:
@@ -276,7 +284,7 @@ def _tare_hint(objective: Objective) -> str:
 
 def _noise_hides_stiffness(objective: Objective, parameters: Bingham) -> str | None:
     """Return the reason where noise of the displacement hides the oil spring, else None."""
-    noise = max(displacement_noise(t.at_samples(t.displacement)) for t in objective.prepared)
+    noise = max(displacement_noise(t.at_samples(t.displacement)) for t in one_at_a_time(objective.prepared))
     spring = objective.scales[0] / parameters.stiffness
     if spring >= SPRING_TO_NOISE * noise:
         return None
@@ -335,7 +343,7 @@ def misfit_of(records: Sequence[FittedRecord]) -> Misfit:
     cycles: list[Array] = []
     smooth: list[Array] = []
     power, samples, peaks = [], [], []
-    for record, cleared in zip(records, _without_nuisances(records), strict=True):
+    for record, cleared in one_at_a_time(zip(records, _without_nuisances(records), strict=True)):
         if not record.constant:
             continue
         folded = record.folded(cleared)
@@ -361,7 +369,7 @@ def _root(square: float) -> float:
     return float(np.sqrt(max(square, 0.0)))
 
 
-def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
+def _without_nuisances(records: Sequence[FittedRecord]) -> Iterator[Array]:
     """Project offset, gain and delay out of the residual (m,) of each record, the parameters free to follow.
 
     Equation: min_d,b sum_t |r_t - J_t d - A_t b_t|^2 / s_t^2 + |b_t|^2, |b| <= 3.5         Source: Gaussian prior
@@ -369,7 +377,7 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     from scipy.optimize import lsq_linear
 
     size = records[0].slopes.shape[1]
-    scale = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in records))
+    scale = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in one_at_a_time(records)))
     scale[scale == 0.0] = 1.0
     whole = size + sum(r.nuisances.shape[1] for r in records)
     normal, right = np.zeros((whole, whole)), np.zeros(whole)
@@ -378,7 +386,7 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     def columns(record: FittedRecord) -> Array:
         return np.hstack([record.slopes / scale, record.nuisances])
 
-    for record in records:
+    for record in one_at_a_time(records):
         both, place = columns(record), np.r_[:size, at : at + record.nuisances.shape[1]]
         calm, noise = (slice(None) if record.calm.all() else record.calm), _noise_variance(record)
         normal[np.ix_(place, place)] += both[calm].T @ both[calm] / noise
@@ -390,10 +398,8 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     limit = np.where(np.arange(whole) < size, np.inf, NUISANCE_LIMIT)
     found = lsq_linear(triangle, np.linalg.solve(triangle.T, right), (-limit, limit)).x
     # The columns of all records at a time would be the most that a fit of many keeps in memory.
-    return [
-        _without_explained(record, columns(record) @ found[place])
-        for record, place in zip(records, places, strict=True)
-    ]
+    for record, place in zip(records, places, strict=True):
+        yield _without_explained(record, columns(record) @ found[place])
 
 
 def _without_explained(record: FittedRecord, explained: Array) -> Array:

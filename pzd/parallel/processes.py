@@ -6,10 +6,13 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+from pzd.parallel.on_disk import let_go
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -53,19 +56,25 @@ def parallel_map(
     >>> parallel_map(lambda number: number**2, [1, 2, 3], jobs=1)
     [1, 4, 9]
     """
-    jobs = min(jobs, len(items)) if _FORKS else 1
     made: list[Made] = []
-
-    def collect(one: Made) -> None:
+    for one in parallel_each(function, items, jobs, first_here=first_here):
         made.append(one)
         if made_one is not None:
             made_one(one)
+    return made
 
+
+def parallel_each(
+    function: Callable[[Item], Made], items: Sequence[Item], jobs: int, *, first_here: bool = False
+) -> Iterator[Made]:
+    """Yield what a function makes of each item, as `parallel_map` does, and keep none of it."""
+    jobs = min(jobs, len(items)) if _FORKS else 1
     here = len(items) if jobs < 2 else int(first_here)
-    for item in items[:here]:
-        collect(function(item))
+    for place in range(here):
+        yield function(items[place])
+        let_go()
     if here == len(items):
-        return made
+        return
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
@@ -74,13 +83,13 @@ def parallel_map(
     pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
     finished = False
     try:
-        futures = [pool.submit(_one, place) for place in range(here, len(items))]
-        for place, future in enumerate(futures, here):
-            collect(_result(future, function, items[place]))
+        futures = deque(pool.submit(_one, place) for place in range(here, len(items)))
+        for place in range(here, len(items)):
+            yield _result(futures.popleft(), function, items[place])
+            let_go()
         finished = True
     finally:
         pool.shutdown(wait=finished, cancel_futures=True)
-    return made
 
 
 def own_python(code: str) -> list[str]:
@@ -144,7 +153,10 @@ def _start_worker(function: Callable[[Any], Any], items: Sequence[Any]) -> None:
 
 def _one(place: int) -> Any:
     function, items = _work
-    return function(items[place])
+    try:
+        return function(items[place])
+    finally:
+        let_go()
 
 
 # --- Progress of a stage that takes long ---

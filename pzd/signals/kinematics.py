@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from pzd.parallel.on_disk import beside
 from pzd.record import Array, Record
 from pzd.signals.average_cycle import AverageCycle
 from pzd.signals.cycles import Cycles, cycles_of
@@ -73,7 +74,7 @@ def clean_displacement_of(record: Record) -> Array:
 
 def remember_clean_displacement(record: Record, clean: Array) -> None:
     """Store the displacement (n,) without noise that was found elsewhere, perhaps in another process [m]."""
-    _clean_by_record[record] = clean
+    _clean_by_record[record] = beside(clean, record.displacement)
 
 
 def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:

@@ -37,9 +37,9 @@ def held(row: ParameterRow, truth: Bingham) -> int:
 def fitted_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
     """Fit the records; return them with residuals and slopes, and the estimate."""
     objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
-    return fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance), np.array(
-        fit.parameters
-    )
+    return fitted_records(
+        records, objective.prepared, objective.fitted_by_record(fit.parameters), config.nuisance
+    ), np.array(fit.parameters)
 
 
 def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
@@ -99,7 +99,7 @@ def test_scatter_between_cycles_widens_an_interval_that_the_colour_of_the_noise_
         fitted, estimate = fitted_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
         widths = half_widths(fitted, misfit_of(fitted))
         covered += np.count_nonzero(np.abs(in_search(estimate) - in_search(np.array(truth))) <= widths)
-        colour = uncertainty(fitted[0].slopes, fitted[0].residuals, [fitted[0].residuals.size])
+        colour = uncertainty([(fitted[0].slopes, fitted[0].residuals)])
         wider.append(widths[1] / colour.half_widths()[1])
     # The median is 2.2 to 2.3; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
     assert np.median(wider) > 1.8

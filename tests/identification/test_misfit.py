@@ -38,7 +38,8 @@ def misfit_for(records: tuple[Record, ...]) -> Misfit:
     """Misfit of the element alone, without auxiliary forces."""
     objective = Objective(tuple(prepare(record) for record in records))
     fit = fit_separable(objective)
-    fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), IdentifyConfig().nuisance)
+    by_record = objective.fitted_by_record(fit.parameters)
+    fitted = fitted_records(records, objective.prepared, by_record, IdentifyConfig().nuisance)
     return misfit_of(fitted)
 
 

@@ -119,8 +119,8 @@ def test_a_parameter_uncertain_by_the_sensors_is_weak_and_never_undetermined(rng
 def test_linearly_dependent_slopes_have_no_partial_sensitivity(rng: np.random.Generator) -> None:
     base = rng.standard_normal((100, 2))
     slopes = np.column_stack([base, base @ [1.0, 2.0]])
-    np.testing.assert_allclose(partial_sensitivities(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
-    assert np.all(partial_sensitivities(base, np.ones(2), 100.0) > 0.5)
+    np.testing.assert_allclose(partial_sensitivities(slopes.T @ slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
+    assert np.all(partial_sensitivities(base.T @ base, np.ones(2), 100.0) > 0.5)
 
 
 def test_undetermined_and_weak_stand_in_one_status() -> None:

@@ -2,7 +2,7 @@
 
     python tests/studies/bench.py                       all; into runs/bench/bench.json
     python tests/studies/bench.py kernels stages        the force of a damper; fit, ride and comfort
-    python tests/studies/bench.py waits files diagnose road engines campaign
+    python tests/studies/bench.py waits files diagnose road engines campaign profile
 
 Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock,
 so that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
@@ -44,6 +44,7 @@ def parts(folder: Path) -> dict[str, Callable[[], Iterator[Row]]]:
         "road": partial(bench_commands.road_hour, folder / "road"),
         "engines": bench_engines.rows,
         "campaign": partial(bench_commands.campaign, folder / "campaign"),
+        "profile": partial(bench_commands.profiles, folder / "profiles"),
     }
 
 

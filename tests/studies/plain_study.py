@@ -351,10 +351,10 @@ def _needless(case_: Case, rig: Rig, rows: Sequence[ParameterRow], settings: Ide
         objective = Objective(tuple(prepare(record) for record in condition.records))
         fit = descend(objective, objective.clipped(case_.dampers[level]))
         fit, stiffest = settle_stiffness(condition.records, objective, fit, settings.nuisance)
-        left = fit.residuals, fit.slopes
-        fitted = fitted_records(condition.records, objective.prepared, left, settings.nuisance)
+        by_record = objective.fitted_by_record(fit.parameters)
+        fitted = fitted_records(condition.records, objective.prepared, by_record, settings.nuisance)
         optimum = [(condition.labels, fit.parameters)]
-        (reference,) = parameter_rows(objective, optimum, left, fitted, stiffest=stiffest)
+        (reference,) = parameter_rows(objective, optimum, fitted, stiffest=stiffest)
         yield from (name for name in ("T0", "C") if name in _doubted(row) and name not in _doubted(reference))
 
 

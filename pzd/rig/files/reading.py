@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from pzd.artefacts import Finding, IngestRow
-from pzd.parallel.processes import parallel_map
+from pzd.parallel.on_disk import OnDisk, one_at_a_time
+from pzd.parallel.processes import parallel_each
 from pzd.quantities import (
     ACCELERATION,
     DISPLACEMENT,
@@ -310,19 +311,22 @@ def read(
     # What a second logger adds to a layout is told apart by its identity, which another process has not.
     alone = any(entry.beside is not None for entry in entries)
     worth = sum(file.path.stat().st_size for file in files) > WORTH_A_PROCESS
-    for file, made in zip(files, parallel_map(read_one, files, jobs if worth and not alone else 1), strict=True):
+    store = OnDisk()
+    for file, made in zip(files, parallel_each(read_one, files, jobs if worth and not alone else 1), strict=True):
         if isinstance(made, ConfigError):
             config_faults += made.messages
         elif isinstance(made, DataError):
             data_faults += made.messages
         else:
             layout_of[file.path] = made[0] or described[file.number]
-            tests += made[1]
+            tests += [(store.kept(test), store.kept(alone)) for test, alone in made[1]]
     end_child()
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
-    right = [both for both in tests if not works_on_the_rig(both[1])]
-    data_faults += sign_faults([both for both in tests if works_on_the_rig(both[1])], layout_of, right)
+    by_work: dict[bool, list[tuple[RawRecord, DamperAlone]]] = {False: [], True: []}
+    for both in one_at_a_time(tests):
+        by_work[works_on_the_rig(both[1])].append(both)
+    data_faults += sign_faults(by_work[True], layout_of, by_work[False])
     if data_faults:
         raise DataError(data_faults)
     called = names([(test.sheet.path, test.number) for test, _ in tests])
@@ -347,11 +351,12 @@ def with_copies_told(tests: Sequence[Named]) -> list[Named]:
     the tests; identification and diagnosis count copies once
     """
     alike: dict[bytes, list[Named]] = {}
-    for one in tests:
-        alike.setdefault(_digest(*one[1:]), []).append(one)
+    digests = [_digest(*one[1:]) for one in one_at_a_time(tests)]
+    for one, digest in zip(tests, digests, strict=True):
+        alike.setdefault(digest, []).append(one)
     found: list[Named] = []
-    for name, test, alone in tests:
-        same = [mate[0] for mate in alike[_digest(test, alone)] if _label(mate[1]) == _label(test)]
+    for (name, test, alone), digest in one_at_a_time(zip(tests, digests, strict=True)):
+        same = [mate[0] for mate in alike[digest] if len(alike[digest]) > 1 and _label(mate[1]) == _label(test)]
         told = test.remarks
         if len(same) > 1 and name == same[0]:
             finding = Finding(

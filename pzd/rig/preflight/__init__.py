@@ -17,7 +17,8 @@ from types import ModuleType
 import numpy as np
 
 from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig
-from pzd.parallel.processes import parallel_map
+from pzd.parallel.on_disk import OnDisk
+from pzd.parallel.processes import parallel_each
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
@@ -143,20 +144,22 @@ def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, prefligh
     waiting: list[Callable[[], PreflightRecord] | None] = list(tests)
     del tests
     records: list[Record] = []
-
-    def collected(made: tuple[Record, Cycles | None, Array, RecordEntry, tuple[IngestRow, ...]]) -> None:
-        record, run, clean, _, _ = made
+    listed: list[RecordEntry] = []
+    ingested: list[IngestRow] = []
+    store = OnDisk()
+    for record, run, clean, entry, rows in parallel_each(examine, waiting, jobs, first_here=True):
         waiting[len(records)] = None
-        if records and np.array_equal(record.time, records[-1].time):
-            record = replace(record, time=records[-1].time)  # most tests of a rig have one clock: it is kept once
+        one_clock = records and np.array_equal(record.time, records[-1].time)
+        kept = replace(record, time=records[-1].time) if one_clock else record  # most tests of a rig have one clock
+        kept = store.kept(kept)
         # A record was made in another process, whose memory of the cycles and the clean motion is lost here.
-        remember_cycles(record, run)
-        remember_clean_displacement(record, clean)
-        records.append(record)
-
-    results = [(entry, rows) for *_, entry, rows in parallel_map(examine, waiting, jobs, collected, first_here=True)]
-    entries = tuple(entry for entry, _ in results)
+        remember_cycles(kept, run)
+        remember_clean_displacement(kept, clean)
+        records.append(kept)
+        listed.append(entry)
+        ingested.extend(rows)
+    entries = tuple(listed)
     for family in families():
         for compare in getattr(family, "COMPARISONS", ()):
             entries = compare(entries)
-    return Rig(tuple(records), entries, tuple(row for _, rows in results for row in rows))
+    return Rig(tuple(records), entries, tuple(ingested))
