@@ -16,9 +16,10 @@ from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split
-from pzd.diagnosis.fit.prediction import predict, predicted_force
+from pzd.diagnosis.fit.prediction import displacement_variance, predict, predicted_force
 from pzd.diagnosis.gap import check_residual, visible_gap
 from pzd.record import Array, Record
+from pzd.signals.noise import pure_error
 from pzd.signals.nuisance import NuisanceConfig
 
 
@@ -205,3 +206,29 @@ def test_steps_that_each_cycle_meets_at_the_same_places_are_no_motion(rate: floa
         kept.append(float(np.std(prepared.record.displacement - true)) / (step / np.sqrt(12.0)))
     assert np.median(kept) < 0.3
     assert np.mean(np.array(kept) < 0.5) >= 0.9
+
+
+# --- An uneven clock
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_clock_that_is_uneven_and_says_so_is_no_gap(seed: int) -> None:
+    """Parts of a record have not quite the same usual step, and so not the same number of points a cycle."""
+    from scipy.interpolate import CubicSpline
+
+    damper, rng = damper_of((0.0,)), np.random.default_rng(seed)
+    even = sine(damper, 0.0, 1.0, 0.02, rng, noise=1e-3, colour=0.0, rate=2000.0, displacement_noise=1e-6)
+    stamps = even.time[::4]
+    time = np.unique(np.round(stamps + 5e-4 * rng.standard_normal(stamps.size), 5))
+    time = time[(time > even.time[0]) & (time < even.time[-1])]
+    channels = CubicSpline(even.time, np.stack([even.displacement, even.velocity, even.acceleration, even.force]).T)
+    x, v, a, force = channels(time).T
+    (prepared,) = prepare((Record("uneven", None, time, x, v, a, force, np.zeros(time.size)),))
+    everything = np.ones(prepared.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(damper, prepared, 5e-4), prepared, everything, NuisanceConfig())
+    assert np.sqrt(max(check.power, 0.0)) < 0.0025 * check.peak
+    assert prepared.average is not None
+    # As for the fit, which folds a part of the record: its step may be another one.
+    fewer = replace(prepared.average.run, count=2)
+    part = replace(prepared, cycles=replace(fewer, period=fewer.period * (1.0 - 2.0 / prepared.average.points)))
+    assert np.size(displacement_variance(damper, part)) == pure_error(part.folded).single.size

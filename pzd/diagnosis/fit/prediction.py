@@ -227,7 +227,9 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     by_timing = np.stack([jump_timing_error(other, known, closed=True) for other in others])
     left = np.stack(others) - known - np.where(calm, 0.0, by_timing)
     changes = np.fft.rfft(left, points, axis=1) / points
-    power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
+    # Of an uneven clock, parts of a record have not quite the same number of points a cycle.
+    size = harmonics_of(prepared.folded.shape[1]) + 1
+    power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[:size]
     beside_jumps = prepared.read_alike * np.mean(np.mean(left * ~calm, axis=1) ** 2)
     power[0] = 0.0
     width = np.ones(2 * NEIGHBOURS + 1)
