@@ -197,7 +197,8 @@ def away(found: Changes, drawn: Pair) -> Iterator[tuple[str, float]]:
             true = _moved(c.name, start, own, given["factor"])
         elif c.parameter in given:
             before = np.nan_to_num(start)
-            absent = np.all((before == 0.0) | (before == library()[c.name].parameter(c.parameter).neutral))
+            neutral = 0.0 if c.of == "stand" else library()[c.name].parameter(c.parameter).neutral
+            absent = np.all((before == 0.0) | (before == neutral))
             if not absent and c.name not in ADDITIVE:
                 continue
             true = given[c.parameter] + (np.zeros_like(before) if absent else before)
