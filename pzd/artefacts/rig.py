@@ -61,6 +61,8 @@ class RecordEntry(Frozen):
     """R.m.s. of the acceleration about its mean."""
     force_rms_N: float | None = None
     """R.m.s. of the force about its mean."""
+    force_peak_N: float | None = None
+    """Largest magnitude of the force."""
     work_J: float | None = None
     """Work done on the damper over the record; below zero where force and displacement have opposite signs."""
     findings: tuple[Finding, ...] = ()

@@ -331,6 +331,7 @@ def entry(name: str, size: float | None, check: str, force: float = 100.0) -> Re
         rate_Hz=500.0,
         cycles=8.0,
         force_rms_N=force,
+        force_peak_N=force,
         findings=told,
     )
 
@@ -350,6 +351,9 @@ def test_low_passes_that_differ_from_record_to_record_or_are_rare_are_a_law_that
 def test_a_range_that_a_larger_force_goes_beyond_is_the_damper_giving_way(largest: float | None, left: int) -> None:
     entries = (entry("slow", None, "range", 50.0), entry("a", 30.0, "range", 100.0), entry("b", largest, "range", 90.0))
     assert sum(len(one.findings) for one in drop_contradicting_ranges(entries)) == left
+    # All cut off at one force: the fastest is flat for longest, has the largest r.m.s., and no larger force.
+    fastest = entry("c", None, "range", 101.0).model_copy(update={"force_rms_N": 200.0})
+    assert sum(len(one.findings) for one in drop_contradicting_ranges((*entries, fastest))) == left
     beyond = (*entries, entry("c", None, "range", 200.0))
     assert sum(len(one.findings) for one in drop_contradicting_ranges(beyond)) == 0
 

@@ -135,6 +135,7 @@ def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, prefligh
             velocity_rms_m_per_s=float(np.std(record.velocity)),
             acceleration_rms_m_per_s2=float(np.std(record.acceleration)),
             force_rms_N=float(np.std(record.force)),
+            force_peak_N=float(np.max(np.abs(record.force))),
             work_J=work(record.displacement, record.force),
             findings=findings(test) if preflight else (),
             removed=test.removed,

@@ -254,11 +254,14 @@ def _cut(section: Section, share: float, zooms: int = 2) -> tuple[ReferenceFit, 
 
 
 def drop_contradicting_ranges(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
-    """Drop the ranges that a record of a larger force does not end at: a damper gives way there, and no amplifier."""
-    free = [e.force_rms_N or 0.0 for e in entries if all(f.check != "range" for f in e.findings)]
+    """Drop the ranges that a record of a larger force does not end at: a damper gives way there, and no amplifier.
+
+    By the peaks: where every test is cut off at one force, the faster has the larger r.m.s., and not the larger force.
+    """
+    free = [e.force_peak_N or 0.0 for e in entries if all(f.check != "range" for f in e.findings)]
     return tuple(
         entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "range")})
-        if (entry.force_rms_N or 0.0) < max(free, default=0.0)
+        if (1.0 + LEAST_CUT) * (entry.force_peak_N or 0.0) < max(free, default=0.0)
         else entry
         for entry in entries
     )
