@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,8 @@ ENOUGH_PARAMETERS = 400
 FIFTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Bins of as many cases, where there are `FULL_FIFTH` to each."""
 FULL_FIFTH = 200
+LARGEST_LOSS = 0.05
+"""Share of the plain damper's gap by which one with effects may at most be farther from the noise-free force."""
 CALIBRATED = 0.05
 """Largest distance of stated confidence and hit rate."""
 TWINS = {"gas_spring", "fluid_inertia"}
@@ -219,6 +222,11 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
             value = float(np.percentile(values, percentile)) if values else None
             figure = f"gap cut{suffix}, {words}"
             yield _line("rightly named, visible", figure, value, len(values), target, _verdict(value, target))
+    handed_on = [c for c in cases if c.gap_cut is not None]
+    farther = "farther from the noise-free force than plain"
+    much = f"so by more than {100.0 * LARGEST_LOSS:g} % of its gap"
+    yield rate_line("effects handed on", farther, handed_on, partial(_is_farther, by=0.0), "<= 0.5 %")
+    yield rate_line("effects handed on", much, handed_on, partial(_is_farther, by=LARGEST_LOSS), "<= 0 %")
     inside = [hit for c in cases if c.truth and rates.visible(c) for hit in c.inside.values()]
     rate = Rate(sum(inside), len(inside))
     met: Met = "too few"
@@ -226,6 +234,11 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
         met = "met" if 0.92 <= rate.share <= 0.98 else "missed"
     figure = "parameters inside their 95 % interval"
     yield _line("rightly found, visible", figure, rate.share, rate.count, "92 to 98 %", met, rate.interval)
+
+
+def _is_farther(case: Scored, by: float) -> bool:
+    """Whether what is handed on is farther from the noise-free force than plain, by more than a share of its gap."""
+    return case.gap_cut is not None and case.gap_cut < -by
 
 
 def _calibration(cases: Sequence[Scored]) -> Iterator[Line]:
