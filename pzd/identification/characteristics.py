@@ -45,27 +45,29 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record], job
 
     def of_one(
         place: tuple[Condition, Record],
-    ) -> tuple[tuple[PeakVelocityRow, ...], tuple[ContinuousVelocityRow, ...], list[WarmUpRow]]:
+    ) -> tuple[tuple[PeakVelocityRow, ...], tuple[ContinuousVelocityRow, ...], list[WarmUpRow], bool]:
         condition, record = place
         with one_record():
             tests = [(record, test) for test in speed_tests(record)]
             warm = [row for part in separate_tests(record) for row in _warm_up_rows(condition, record.name, part)]
-            return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm
+            slips = all(test.slips for _, test in tests)
+            return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm, slips
 
     places = [(condition, record) for condition in constant for record in condition.records]
     found = list(zip(places, parallel_map(of_one, places, jobs, first_here=True), strict=True))
     peaks = tuple(
         row
         for condition in constant
-        for row in _slowest_first(row for (mine, _), (rows, _, _) in found if mine is condition for row in rows)
+        for row in _slowest_first(row for (mine, _), (rows, *_) in found if mine is condition for row in rows)
     )
     steps = tuple(row for record in moving for row in _step_rows(record))
-    warm = tuple(row for _, (_, _, rows) in found for row in rows)
+    warm = tuple(row for _, (_, _, rows, _) in found for row in rows)
+    strained = {record.name for (_, record), (*_, slips) in found if not slips}
     recognised = {row.record for rows in (peaks, steps, warm) for row in rows}
     return Characteristics(
         peak_velocity=peaks,
-        continuous_velocity=tuple(row for _, (_, rows, _) in found for row in rows),
-        gas_and_friction=gas_and_friction(peaks),
+        continuous_velocity=tuple(row for _, (_, rows, *_) in found for row in rows),
+        gas_and_friction=gas_and_friction([row for row in peaks if row.record not in strained]),
         steps=steps,
         warm_up=warm,
         as_it_stands=as_it_stands(constant, moving, recognised),
@@ -188,7 +190,7 @@ def gas_and_friction(rows: Sequence[PeakVelocityRow]) -> tuple[GasAndFrictionRow
 
     Parameters
     ----------
-    rows : of the peak-velocity plot, of any conditions
+    rows : of the peak-velocity plot, of any conditions, of tests in which the rod slips
     """
     by_condition: dict[tuple[str | None, float | None, float | None], list[PeakVelocityRow]] = {}
     for row in rows:

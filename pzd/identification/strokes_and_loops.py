@@ -42,6 +42,11 @@ BESIDE_PEAK = 0.4
 """Half width of the parabola for the force at the peak, as a share of half that time: 18 degrees of a sine."""
 SMOOTHNESS = 0.005
 """Largest r.m.s. deviation from the polynomial around the middle, as a share of the stroke, with a single peak."""
+LEAST_FULLNESS = 0.05
+"""Least work of a cycle, as a share of its stroke times the range of its force, of a rod that slips.
+
+Reason: friction fills the whole, damping pi/4, an oil spring nothing; beside a gas spring of twenty times the friction
+neither would be read anyway."""
 FEWEST_POINTS = 6
 """Fewest samples for a fit over a part of a stroke."""
 
@@ -192,6 +197,23 @@ class SpeedTest:
     strokes: tuple[Stroke, ...]
     cycle: Cycle | None
     """Average cycle, where the motion repeats."""
+
+    @property
+    def slips(self) -> bool:
+        """Whether the rod slips: a test that only strains the oil spring does no work, and hides friction and gas.
+
+        Equation: W / (L range F) >= LEAST_FULLNESS, W work of a stroke each way, L its length; 1 of dry friction
+        """
+        works = {True: [0.0], False: [0.0]}
+        for stroke in self.strokes:
+            works[stroke.rebound].append(float(np.trapezoid(stroke.force - self._mean_force, stroke.displacement)))
+        whole = sum(sum(each) / max(len(each) - 1, 1) for each in works.values())
+        length = float(np.mean([stroke.length for stroke in self.strokes]))
+        return whole >= LEAST_FULLNESS * length * float(np.ptp(np.concatenate([s.force for s in self.strokes])))
+
+    @property
+    def _mean_force(self) -> float:
+        return float(np.mean(np.concatenate([stroke.force for stroke in self.strokes])))
 
 
 def speed_tests(record: Record) -> tuple[SpeedTest, ...]:

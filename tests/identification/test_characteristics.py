@@ -222,6 +222,17 @@ def test_a_slow_test_shows_gas_force_and_friction_as_they_are() -> None:
     assert turned.gas_force_N == pytest.approx(-85.0, rel=1e-3)
 
 
+def test_a_slow_test_that_only_strains_the_oil_spring_shows_neither() -> None:
+    """It gave "gas 150 N, friction 0": what the spring stood at as the test began, of a damper of 300 N."""
+    truth = Bingham(300.0, 2000.0, 1e5)
+    slow = replace(sine_test(truth, 0.02, 0.001), name="slow")
+    slow = replace(slow, force=slow.force + 150.0)
+    assert of(slow).gas_and_friction == ()
+    (row,) = of(slow, replace(sine_test(truth, 0.02, 0.03), name="slipping")).gas_and_friction
+    assert row.gas_force_N == pytest.approx(0.0, abs=2.0)
+    assert row.friction_N == pytest.approx(300.0, rel=0.03)
+
+
 def test_faster_tests_lead_to_rest_along_a_line() -> None:
     truth = TABLE_2[0.0]
     record = at_constant_speed(SPEEDS, truth)
