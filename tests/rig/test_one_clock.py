@@ -12,7 +12,7 @@ from written_files import refused, run
 from pzd.cli.app import status
 from pzd.record import Array
 from pzd.rig.files.guess import guessed
-from pzd.rig.files.one_clock import resampled
+from pzd.rig.files.one_clock import _follows, resampled
 
 STROKE, FREQUENCY, FRICTION, DAMPING = 0.02, 1.5, 150.0, 900.0
 
@@ -222,3 +222,11 @@ def test_each_recording_is_completed_by_the_channel_that_runs_beside_all(tmp_pat
     first, second = run(tmp_path, {"path": "a.tdms", "columns": NAMED["columns"] | {"temperature": "Oil"}}).entries
     assert first.temperature_degC == pytest.approx(20.7, abs=0.2)
     assert second.temperature_degC == pytest.approx(26.2, abs=0.2)
+
+
+def test_whether_a_channel_follows_does_not_depend_on_its_unit(rng: np.random.Generator) -> None:
+    """A channel of 1e200 overflowed, with a warning of numpy in the terminal."""
+    smooth, rough = np.sin(np.linspace(0.0, 9.0, 400)), rng.standard_normal(400)
+    for scale in (1e-200, 1.0, 1e200):
+        assert _follows(scale * smooth)
+        assert not _follows(scale * rough)

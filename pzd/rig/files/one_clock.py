@@ -263,7 +263,8 @@ def _follows(values: Array) -> bool:
     """Whether samples (n,) have next to nothing in the uppermost part of their band."""
     if values.size < 8:
         return False
-    power = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(values.size))) ** 2
+    scaled = values / max(float(np.max(np.abs(values))), np.finfo(np.float64).tiny)
+    power = np.abs(np.fft.rfft((scaled - scaled.mean()) * np.hanning(values.size))) ** 2
     top = power[int(TOP * power.size) :]
     return bool(top.sum() <= FOLLOWS * power.sum())
 
