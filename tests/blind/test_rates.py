@@ -228,11 +228,9 @@ def test_intervals_count_from_400_parameters_on(case: Make) -> None:
 
 
 def test_what_is_handed_on_is_held_to_the_noise_free_force_whatever_its_name(case: Make) -> None:
-    said = [case(gap_cut=cut) for cut in (0.9, 0.5, -0.01)] + [
-        case(effects=("lash",), gap_cut=-0.2),
-        case(gap_cut=None),
-    ]
-    found = {line.figure: line for line in lines(said) if line.about == "effects handed on"}
+    said = [case(gap_cut_gains_out=cut) for cut in (0.9, 0.5, -0.01, None)]
+    said.append(case(effects=("lash",), gap_cut_gains_out=-0.2))
+    found = {line.figure: line for line in lines(said) if line.about.startswith("effects handed on")}
     farther, much = found.values()
     assert (farther.value, farther.count, farther.met) == (0.5, 4, "missed")
     assert (much.value, much.count, much.met) == (0.25, 4, "missed")
