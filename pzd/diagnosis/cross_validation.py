@@ -573,23 +573,22 @@ def _not_shown(problem: Problem, damper: Damper) -> list[str]:
 
     Equation: |r|^2 without it - |r|^2 < p ln n, p its parameters       Source: Schwarz 1978, Ann. Stat. 6, 461-464
     """
-    whole = _misfit(problem, damper)
-    size = sum(o.weights.size * 2 - 1 if o.weights.size else o.measured.size for o in problem.observations)
-    return [
-        name
-        for name in damper.effects
-        if _misfit(problem, damper.without_effects(name)) - whole < len(problem.unknowns((name,))) * float(np.log(size))
-    ]
+    whole = _residuals(problem, damper)
+
+    def shown(name: str) -> bool:
+        without, penalty = _residuals(problem, damper.without_effects(name)), np.log(whole.size)
+        return bool(without @ without - whole @ whole >= len(problem.unknowns((name,))) * penalty)
+
+    return [name for name in damper.effects if not shown(name)]
 
 
-def _misfit(problem: Problem, damper: Damper) -> float:
-    """Compute the sum of squared residuals of a damper, in units of noise."""
-    total = 0.0
+def _residuals(problem: Problem, damper: Damper) -> Array:
+    """Compute the (w,) residuals of a damper in all tests, in units of noise."""
+    found = []
     for o in problem.observations:
         force, sensors = prompt_force(o, damper)
-        left = o.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)
-        total += float(np.sum(left**2))
-    return total
+        found.append(o.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)[:, 0])
+    return np.concatenate(found)
 
 
 def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) -> CrossValidation:

@@ -45,13 +45,15 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record], job
 
     def of_one(
         place: tuple[Condition, Record],
-    ) -> tuple[tuple[PeakVelocityRow, ...], tuple[ContinuousVelocityRow, ...], list[WarmUpRow], bool]:
+    ) -> tuple[
+        tuple[PeakVelocityRow, ...], tuple[ContinuousVelocityRow, ...], list[WarmUpRow], tuple[PeakVelocityRow, ...]
+    ]:
         condition, record = place
         with one_record():
             tests = [(record, test) for test in speed_tests(record)]
             warm = [row for part in separate_tests(record) for row in _warm_up_rows(condition, record.name, part)]
-            slips = all(test.slips for _, test in tests)
-            return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm, slips
+            slipping = peak_velocity(condition, [(record, test) for _, test in tests if test.slips])
+            return peak_velocity(condition, tests), continuous_velocity(condition, tests), warm, slipping
 
     places = [(condition, record) for condition in constant for record in condition.records]
     found = list(zip(places, parallel_map(of_one, places, jobs, first_here=True), strict=True))
@@ -62,12 +64,11 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record], job
     )
     steps = tuple(row for record in moving for row in _step_rows(record))
     warm = tuple(row for _, (_, _, rows, _) in found for row in rows)
-    strained = {record.name for (_, record), (*_, slips) in found if not slips}
     recognised = {row.record for rows in (peaks, steps, warm) for row in rows}
     return Characteristics(
         peak_velocity=peaks,
         continuous_velocity=tuple(row for _, (_, rows, *_) in found for row in rows),
-        gas_and_friction=gas_and_friction([row for row in peaks if row.record not in strained]),
+        gas_and_friction=gas_and_friction([row for _, (*_, rows) in found for row in rows]),
         steps=steps,
         warm_up=warm,
         as_it_stands=as_it_stands(constant, moving, recognised),

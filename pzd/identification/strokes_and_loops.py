@@ -204,16 +204,16 @@ class SpeedTest:
 
         Equation: W / (L range F) >= LEAST_FULLNESS, W work of a stroke each way, L its length; 1 of dry friction
         """
-        works = {True: [0.0], False: [0.0]}
-        for stroke in self.strokes:
-            works[stroke.rebound].append(float(np.trapezoid(stroke.force - self._mean_force, stroke.displacement)))
-        whole = sum(sum(each) / max(len(each) - 1, 1) for each in works.values())
-        length = float(np.mean([stroke.length for stroke in self.strokes]))
-        return whole >= LEAST_FULLNESS * length * float(np.ptp(np.concatenate([s.force for s in self.strokes])))
+        force = np.concatenate([stroke.force for stroke in self.strokes])
+        middle = force.mean()
 
-    @property
-    def _mean_force(self) -> float:
-        return float(np.mean(np.concatenate([stroke.force for stroke in self.strokes])))
+        def mean_work(*, rebound: bool) -> float:
+            each = [work(s.displacement, s.force - middle) for s in self.strokes if s.rebound == rebound]
+            return float(np.mean(each)) if each else 0.0
+
+        length = float(np.mean([stroke.length for stroke in self.strokes]))
+        whole = mean_work(rebound=True) + mean_work(rebound=False)
+        return whole >= LEAST_FULLNESS * length * float(np.ptp(force))
 
 
 def speed_tests(record: Record) -> tuple[SpeedTest, ...]:

@@ -3,8 +3,8 @@
 Noise of the displacement goes through a stiff oil into the force, and its second derivative looks like inertia. Where
 the motion repeats, cycles are averaged, and only harmonics well above their own scatter are kept, over the whole cycle
 or in short parts of it, such as the corners of a triangle. Steps that each cycle meets alike do not scatter: of the
-harmonics beyond which there is no more than the steps add, the first are as large as a drive may distort its motion,
-with what the steps leave unknown of them, and the others are no motion.
+harmonics that noise or steps hide, as much is expected as where the corners of the motion go on, or as a drive distorts
+it, with what is left unknown of them.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ the h-th is (2/h)^2 of it, as where the speed of the rod jumps at a reversal.
 
 Reason: makers of servo-hydraulic stands state a distortion of 0.5 to 3 % in all. Not tuned."""
 FAR_TAIL = 1e4
-"""Standard errors below zero from which the mean of the tail is that of an exponential: to the square of its inverse.
+"""Standard errors below zero beyond which a truncated normal is taken for its limit, an exponential.
 
-Reason: nearer it is exact, farther the difference of two large numbers."""
+Reason: the two differ by 1e-8 there, and farther out the exact mean is the difference of two large numbers."""
 BEYOND = 3
 """Multiple of the highest harmonic up to which an error is drawn.
 
@@ -114,7 +114,7 @@ class AverageCycle:
 
         Equation: mean over l/2 < h <= l of h^4 |c_h|^2, l the last clear harmonic; 0 where that is the first
         """
-        last = int(np.max(np.flatnonzero(self.clear)))
+        last = int(np.max(np.flatnonzero(self.clear), initial=0))
         order = np.arange(max(last // 2 + 1, 2), last + 1)
         return float(np.mean((order**2 * np.abs(self.harmonics[order])) ** 2)) if order.size else 0.0
 

@@ -98,6 +98,15 @@ def test_the_error_of_a_triangle_is_as_large_as_stated(noise: float, step: float
         assert 0.1 < np.sum(found[octave]) / np.sum(said[octave]) < 3.0, low
 
 
+def test_a_motion_within_one_step_of_its_channel_has_no_harmonics(rng: Generator) -> None:
+    time = np.arange(800) / 100.0
+    seen = np.where(np.arange(800) % 100 < 5, 1.0, 0.0)
+    average = AverageCycle.of(time, seen, Cycles(1.0, 0.0, 8))
+    assert average.resolved == 0
+    assert average.corner == 0.0
+    assert np.all(np.isfinite(average.error(rng)))
+
+
 def test_what_noise_hides_is_expected_and_what_it_shows_is_believed(rng: Generator) -> None:
     """Powers drawn from an exponential of mean 1 and seen with an error: their mean, given what was seen."""
     true = rng.exponential(1.0, 400_000)
