@@ -18,11 +18,12 @@ from pzd.damper.effects import library
 from pzd.damper.model import against_nature
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
+from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import refit
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
+from pzd.fit.cross_validation import PredictionError
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"

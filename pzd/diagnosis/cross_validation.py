@@ -24,16 +24,21 @@ from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, prompt_force, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
+from pzd.fit.cross_validation import (
+    FOLDS,
+    PredictionError,
+    folds_in_turn,
+    held_out_residuals,
+    predicts_better,
+    predicts_worse,
+    squared_sums,
+)
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 # --- Folds: each test is held out once
 
 
-FOLDS_BY_VOLTAGE = 5
-"""Folds over which the tests of each voltage are spread.
-
-Reason: about a fifth of the tests is held out at a time: enough is left to fit, and the refits stay few."""
 PARTS = 2
 """Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
 
@@ -58,6 +63,8 @@ class Folds:
 def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     """Assign the tests of each voltage to folds in turn, so that each fold holds out some tests of each voltage.
 
+    In the order of their names: whichever way the files are listed, and the tests of another state alike.
+
     Parameters
     ----------
     prepared : records of one setting
@@ -71,14 +78,14 @@ def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     groups = tuple(tuple(sorted(found, key=lambda i: prepared[i].record.name)) for found in members.values())
     voltages = tuple(None if node < 0 else nodes[node] for node in members)
     sizes = [p.record.time.size for p in prepared]
-    folds = tuple(tuple(np.zeros(n, dtype=np.bool_) for n in sizes) for _ in range(FOLDS_BY_VOLTAGE))
+    folds = tuple(tuple(np.zeros(n, dtype=np.bool_) for n in sizes) for _ in range(FOLDS))
     for turn, group in enumerate(groups):
-        for place, i in enumerate(group):
-            if len(group) > 1:
-                folds[(turn + place) % min(FOLDS_BY_VOLTAGE, max(len(group), PARTS))][i][:] = True
-            else:
-                for part, mask in enumerate(_halves(prepared[i])):
-                    folds[(turn + part) % FOLDS_BY_VOLTAGE][i][:] = mask
+        if len(group) > 1:
+            for i, fold in zip(group, folds_in_turn(len(group), turn), strict=True):
+                folds[fold][i][:] = True
+        else:
+            for part, mask in enumerate(_halves(prepared[group[0]])):
+                folds[(turn + part) % FOLDS][group[0]][:] = mask
     return Folds(groups, voltages, tuple(fold for fold in folds if any(mask.any() for mask in fold)))
 
 
@@ -92,143 +99,7 @@ def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
     return first, ~first
 
 
-# --- Prediction errors and their comparison
-
-
-@dataclass(frozen=True, eq=False)
-class PredictionError:
-    """Prediction error of held-out tests, one entry per test, or per half of one that is alone at its voltage.
-
-    Examples
-    --------
-    Two tests of energy 100 N^2 each, predicted with squared residuals of 1 and 3 N^2:
-
-    >>> error = PredictionError.of_entries([0, 1], [(1.0, 100.0, 80.0, 0.0), (3.0, 100.0, 80.0, 0.0)])
-    >>> error.criterion, error.determination
-    (0.02, 0.975)
-    """
-
-    records: tuple[int, ...]
-    """Index of the record of each entry."""
-    error: Array
-    """(t,) sum of squared residuals [N^2]."""
-    energy: Array
-    """(t,) sum of squared forces [N^2]."""
-    spread: Array
-    """(t,) sum of squared deviations of the force from its mean over the entry [N^2]."""
-    negligible: Array
-    """(t,) error that does not count [N^2]: a residual of the visible size at every sample, and where the other half
-    of the test was fitted also what offset, gain and delay of the test may contribute."""
-
-    @classmethod
-    def of_entries(cls, records: Sequence[int], entries: Sequence[tuple[float, ...]]) -> PredictionError:
-        """Collect entries (error, energy, spread, negligible) of some records."""
-        return cls(tuple(records), *np.array(entries, dtype=np.float64).reshape(-1, 4).T)
-
-    @classmethod
-    def concatenated(cls, parts: Sequence[PredictionError]) -> PredictionError:
-        """Join the entries of several folds."""
-        names = ("error", "energy", "spread", "negligible")
-        sums = (np.concatenate([np.zeros(0), *(getattr(p, name) for p in parts)]) for name in names)
-        return cls(tuple(i for part in parts for i in part.records), *sums)
-
-    @property
-    def criterion(self) -> float | None:
-        """W_s pooled over the entries; None without any.
-
-        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
-        """
-        return float(self.error.sum() / self.energy.sum()) if self.records else None
-
-    @property
-    def determination(self) -> float | None:
-        """R2 pooled over the entries, each about its own mean; None without any, or where the force is constant.
-
-        Equation: 1 - sum (F - F_sim)^2 / sum (F - mean F)^2                      Source: coefficient of determination
-        """
-        return float(1.0 - self.error.sum() / self.spread.sum()) if self.spread.sum() > 0.0 else None
-
-    def visibly_below(self, other: PredictionError) -> bool:
-        """Whether the total error is smaller than another one by a visible amount."""
-        return float((other.error - self.error).sum()) > float(self.negligible.sum())
-
-    def of_records(self, wanted: Sequence[int]) -> PredictionError:
-        """Select the entries of some records."""
-        kept = np.isin(self.records, wanted)
-        records = tuple(r for r, k in zip(self.records, kept, strict=True) if k)
-        return PredictionError(records, self.error[kept], self.energy[kept], self.spread[kept], self.negligible[kept])
-
-
-FEWEST_DIFFERENCES = 2
-"""Fewest differences of which a standard error can be computed."""
-
-
-def squared_sums(force: Array, residual: Array) -> tuple[float, float, float]:
-    """Return the sums of squares of residual, force and force about its mean, from (n,) samples [N]."""
-    about_mean = force - force.mean()
-    return float(residual @ residual), float(force @ force), float(about_mean @ about_mean)
-
-
-def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
-    """Whether one damper predicts worse than another: visibly, and beyond chance however few the tests.
-
-    Equation: mean d > t s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one, P(t_(n-1) < t) = P(z < 2)
-                                                                Source: Student 1908, the t-test of paired differences
-    """
-    from scipy.special import ndtr, stdtrit
-
-    tests = len(one.records)
-    errors = float(stdtrit(tests - 1, ndtr(thresholds.PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
-    return _error_is_larger(one, other, errors)
-
-
-def predicts_better(one: PredictionError, other: PredictionError) -> bool:
-    """Whether one damper predicts better than another: visibly, and by two standard errors.
-
-    Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
-    verdict, and nothing speaks against it. The differences may be those of the logarithms too: an effect that shows
-    much in one test and little in another, and takes the same share of either error, is no chance.
-    """
-    if _error_is_larger(other, one, thresholds.PREDICTION_STANDARD_ERRORS):
-        return True
-    return one.visibly_below(other) and ratio_in_standard_errors(one, other) > thresholds.PREDICTION_STANDARD_ERRORS
-
-
-def ratio_in_standard_errors(one: PredictionError, other: PredictionError) -> float:
-    """Compute by how many standard errors the errors of another damper are larger, as a ratio; 0 of a single test.
-
-    Equation: t = mean d / (s_d / sqrt(n)), d_i = ln W_s,i of the other one - ln W_s,i  Source: Student 1908, paired
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.log(other.error / one.error)
-    if ratio.size < FEWEST_DIFFERENCES or not np.isfinite(ratio).all():
-        return 0.0
-    deviation, mean = standard_error(ratio), float(ratio.mean())
-    return mean / deviation if deviation > 0.0 else float(np.sign(mean)) * np.inf if mean else 0.0
-
-
-def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
-    """Whether one error is visibly larger, and by so many standard errors of the paired differences."""
-    if not one.records:
-        return False
-    difference = (one.error - other.error) / one.energy
-    if not np.isfinite(difference).all():  # a diverged simulation is worse than any other
-        return not np.isfinite(one.error).all() and bool(np.isfinite(other.error).all())
-    return other.visibly_below(one) and float(difference.mean()) > errors * standard_error(difference)
-
-
-def standard_error(differences: Array) -> float:
-    """Compute the standard error of the mean of (n,) differences; 0 of a single one.
-
-    Examples
-    --------
-    >>> round(standard_error(np.array([1.0, 2.0, 3.0])), 4)
-    0.5774
-    """
-    largest = float(np.max(np.abs(differences)))  # scaled by it, for the squares of a diverged simulation may overflow
-    if differences.size < FEWEST_DIFFERENCES or largest == 0.0:
-        return 0.0
-    return largest * float(np.std(differences / largest, ddof=1) / np.sqrt(differences.size))
+# --- Comparison at left-out voltages
 
 
 def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
@@ -244,10 +115,6 @@ REFIT_EVALUATIONS = 6
 """Evaluations of a refit without one fold.
 
 Reason: it begins at the optimum of all tests, which a fifth of them moves little."""
-SMALLEST_SINGULAR = 1e-10
-"""Singular value of a fold's normal equations, scaled to a unit diagonal, below which it shows no direction.
-
-Reason: far above rounding, far below what tests determine."""
 FITS_TO_ALL = thresholds.CROSS_VALIDATED_CANDIDATES + 1
 """Fits to every sample that are kept: those of the candidates of a step, which the best is asked for once more, and of
 the damper that they are compared with."""
@@ -329,8 +196,7 @@ class CrossValidation(Folds):
         The noise of single samples is left out: tests that repeat count as their average cycles. A test that is alone
         at its voltage counts as it was fitted: its halves share its harmonics.
 
-        Equation: r_f + J_f (A - J_f' J_f)^-1 J_f' r_f, A = J' J + P' P, f the tests of a fold, P the prior
-                                                        Source: Allen 1974, Technometrics 16, 125-127, by groups
+        Equation: see `pzd.fit.cross_validation.held_out_residuals`
 
         Parameters
         ----------
@@ -339,20 +205,11 @@ class CrossValidation(Folds):
         """
         ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
         slopes = np.split(fitted.jacobian.dense(), ends)
-        normal = sum((each.T @ each for each in slopes), fitted.prior.T @ fitted.prior)
-        size = np.sqrt(np.maximum(np.diag(normal), np.finfo(np.float64).tiny))
-        squares = np.array([r @ r for r in fitted.residuals])
         number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
         records = [number[o.name] for o in problem.observations]
-        for tests in self.held_out_tests():
-            members = [i for i, record in enumerate(records) if record in tests]
-            if not members:
-                continue
-            held, left = (np.concatenate([of[i] for i in members]) for of in (slopes, fitted.residuals))
-            rest = (normal - held.T @ held) / np.outer(size, size)
-            step = np.linalg.lstsq(rest, held.T @ left / size, rcond=SMALLEST_SINGULAR)[0] / size
-            for i in members:
-                squares[i] = float(np.sum((fitted.residuals[i] + slopes[i] @ step) ** 2))
+        members = ([i for i, record in enumerate(records) if record in tests] for tests in self.held_out_tests())
+        left = held_out_residuals(slopes, fitted.residuals, [fold for fold in members if fold], fitted.prior)
+        squares = [float(r @ r) for r in left]
         entries = []
         for record, o, force, seen, square in zip(
             records, problem.observations, fitted.simulated, fitted.residuals, squares, strict=True

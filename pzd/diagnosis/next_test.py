@@ -17,8 +17,9 @@ from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
+from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.data import PreparedRecord
+from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array
 from pzd.rig.config import Limits
 from pzd.signals.measures import rms

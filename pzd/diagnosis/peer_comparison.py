@@ -14,11 +14,12 @@ from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParam
 from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.model import Damper
 from pzd.diagnosis import narx
-from pzd.diagnosis.cross_validation import Folds, PredictionError, assign_folds, squared_sums
+from pzd.diagnosis.cross_validation import Folds, assign_folds
 from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
 from pzd.diagnosis.fit.prediction import comparable_samples
 from pzd.diagnosis.narx import Order
 from pzd.diagnosis.peers import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion, peers
+from pzd.fit.cross_validation import PredictionError, squared_sums
 from pzd.fit.least_squares import minimise, minimise_from
 from pzd.record import Array, Mask
 from pzd.schema.errors import ConfigError, DataError

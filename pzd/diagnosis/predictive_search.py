@@ -23,12 +23,13 @@ from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
+from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
 from pzd.diagnosis.search.determination import MAY_BE_OFF, showing, undetermined
+from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array
 from pzd.signals.measures import rms
 

@@ -14,12 +14,8 @@ import numpy as np
 from pzd.artefacts.diagnosis import Support
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption
-from pzd.diagnosis.cross_validation import (
-    FEWEST_DIFFERENCES,
-    CrossValidation,
-    PredictionError,
-    ratio_in_standard_errors,
-)
+from pzd.diagnosis.cross_validation import CrossValidation
+from pzd.fit.cross_validation import FEWEST_DIFFERENCES, PredictionError, log_ratios, paired_t
 
 
 def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Support]:
@@ -63,7 +59,7 @@ def _support(
 ) -> Support:
     """Compare the errors of the tests with and without an effect; `other` would do as well in its place.
 
-    Equation: s = sum (e_i' - e_i) / sum e_i of the baseline, P = P(t_(n-1) < t), t as in `ratio_in_standard_errors`
+    Equation: s = sum (e_i' - e_i) / sum e_i of the baseline, P = P(t_(n-1) < t), t of `log_ratios`
                                                                 Source: Student 1908, the t-test of paired differences
     """
     from scipy.special import stdtr
@@ -74,7 +70,7 @@ def _support(
     held = sorted({i for tests in validation.held_out_tests() for i in tests})
     confidence = None
     if len(held) >= FEWEST_DIFFERENCES:
-        errors = ratio_in_standard_errors(own.of_records(held), without.of_records(held))
+        errors = paired_t(log_ratios(own.of_records(held), without.of_records(held)))
         chance = float(stdtr(len(held) - 1, errors))
         confidence = round(chance / 2.0 if other else chance, 3)
     return Support(

@@ -120,11 +120,6 @@ MOST_REWEIGHTINGS = 5
 """Times that the tests are reweighted at the end, at most.
 
 Reason: time; what swings between two optima would never end."""
-PREDICTION_STANDARD_ERRORS = 2.0
-"""Standard errors of the paired difference over tests from which one damper predicts worse than another; of few tests
-as many more as Student's t takes for the same confidence.
-
-Reason: the customary 95 %."""
 
 INTERPOLATION_ERROR_RATIO = 1.5
 """Interpolation error at a left-out voltage, as a multiple of the baseline's, from which effects are not adopted.

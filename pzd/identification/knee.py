@@ -15,6 +15,15 @@ from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, Parame
 from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
+from pzd.fit.cross_validation import (
+    FEWEST_TESTS,
+    PredictionError,
+    folds_in_turn,
+    log_ratios,
+    squared_sums,
+    standard_error,
+    student_errors,
+)
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns
 from pzd.identification.knee_fit import (
@@ -94,7 +103,7 @@ def identify_knees(
         log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
         laws.append(law)
     clicks, units = force_changes(forces, control)
-    return Knees(tuple(rows), tuple(forces), clicks, tuple(row for row, _ in found), tuple(laws), units)
+    return Knees(tuple(rows), tuple(forces), clicks, tuple(row for row, _, _ in found), tuple(laws), units)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,69 +295,62 @@ def _status(
 
 # --- Choice of the law by held-out tests ---
 
-LAW_FOLDS = 5
-"""Folds of the cross-validation of a law, or one a test where they are fewer."""
-SIGNIFICANT_ERRORS = 2.0
-"""Standard errors beyond which a mean is significant, as in diagnose; of few tests more, as Student's t has it."""
-FEWEST_TESTS = 3
-"""Fewest tests for a standard error."""
+HeldOutLaws = tuple[PredictedRow, tuple[float, ...], tuple[float, ...]]
+"""A held-out test: its row, and the entry of a `PredictionError` of Bingham's and of the knee law."""
 
 
-def held_out_predictions(
-    labels: Labels, tests: KneeData, knee: KneeFit, bingham: KneeFit
-) -> list[tuple[PredictedRow, Array]]:
+def held_out_predictions(labels: Labels, tests: KneeData, knee: KneeFit, bingham: KneeFit) -> list[HeldOutLaws]:
     """Predict every test of a condition by both laws, each fitted without it; none where the test is alone.
+
+    The tests are dealt into folds in the order of their speeds: both laws are functions of the speed, and every fold
+    leaves slow and fast ones to fit.
 
     Parameters
     ----------
     labels : of the condition
     tests : of the condition
     knee, bingham : the optima over all tests, at which the refits start
-
-    Returns
-    -------
-    the rows, each with (4,) sums over its samples [N2]: squared errors of Bingham's and of the knee law, squares of the
-    measured force, and of the misfit threshold
     """
     count = len(tests.tests)
     if count < 2:
         return []
     order = np.argsort([float(np.max(np.abs(test.record.velocity))) for test in tests.tests], kind="stable")
     found = {}
-    for fold in range(min(LAW_FOLDS, count)):
-        out = order[fold::LAW_FOLDS].tolist()
+    dealt = np.array(folds_in_turn(count))
+    for fold in sorted(set(dealt.tolist())):
+        out = order[dealt == fold].tolist()
         rest = tests.subset([i for i in range(count) if i not in out])
         fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT_EVALUATIONS) for fit in (bingham, knee)]
         for i in out:
             one = tests.subset([i])
             left = [one.measured - fit.predicted(one) for fit in fits]
-            unseen = np.full(one.measured.size, MISFIT_THRESHOLD * one.peak)
-            squares = np.array([float(r @ r) for r in (*left, one.measured, unseen)])
+            unseen = one.measured.size * (MISFIT_THRESHOLD * one.peak) ** 2
+            of_bingham, of_knee = ((*squared_sums(one.measured, each), unseen) for each in left)
             W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
             name = one.tests[0].record.name
             row = PredictedRow(record=name, **label_columns(labels), W_s_bingham=W_s_bingham, W_s_knee=W_s_knee)
-            found[i] = row, squares
+            found[i] = row, of_bingham, of_knee
     return [found[i] for i in range(count)]
 
 
 def law_row(
     asked: Literal["bingham", "knee", "auto"],
     setting: str | None,
-    found: Sequence[tuple[PredictedRow, Array]],
+    found: Sequence[HeldOutLaws],
     conditions: int,
 ) -> LawRow:
     """Choose the law of one setting.
 
-    Equation: knee where mean d > t s_d / sqrt(n), d_i = ln((e_B,i + e_0,i) / (e_K,i + e_0,i)), P(t_(n-1) < t) =
-    P(z < 2), e the squared errors of either law and e_0 those that do not show, and where the error over all is visibly
-    less; of ratios, so that each test counts alike and no slow one rules
-                                                                        Source: Student 1908, paired differences
+    The knee law where it predicts better beyond chance by the ratios of the errors, and visibly over all; the
+    differences of W_s, which the slowest test rules, are not asked: friction is all of its force.
+
+    Equation: mean d > t s_d / sqrt(n), d of `log_ratios`, t of `student_errors`    Source: Student 1908, paired t-test
 
     Parameters
     ----------
     asked : law that the config asks for
     setting : of the rig
-    found : its held-out tests, with the squares of `held_out_predictions`
+    found : its held-out tests
     conditions : number of its conditions to which the knee law was fitted
 
     Returns
@@ -356,10 +358,10 @@ def law_row(
     the law, with the reason
     """
     count = len(found)
-    squares = np.sum([each for _, each in found], axis=0) if found else None
-    pooled = None if squares is None else (float(squares[0] / squares[2]), float(squares[1] / squares[2]))
-    comparison = f"{count} tests kept back are predicted with W_s {pooled[1]:.3g} by the knee law" if pooled else ""
-    comparison += f", {pooled[0]:.3g} by Bingham's" if pooled else ""
+    bingham = PredictionError.of_entries(range(count), [of_bingham for _, of_bingham, _ in found])
+    knee = PredictionError.of_entries(range(count), [of_knee for _, _, of_knee in found])
+    comparison = f"{count} tests kept back are predicted with W_s {knee.criterion:.3g} by the knee law" if count else ""
+    comparison += f", {bingham.criterion:.3g} by Bingham's" if count else ""
     law: LawName = "bingham"
     if not conditions:
         reason = "the knee law needs tests at a constant control signal"
@@ -369,32 +371,18 @@ def law_row(
         reason = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; "
         reason += "record several in a condition"
     else:
-        mean, least = _mean_log_ratio(np.array([each for _, each in found]))
-        visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
+        ratios = log_ratios(knee, bingham)
+        mean, least = float(ratios.mean()), student_errors(count) * standard_error(ratios)
+        visible = knee.visibly_below(bingham)
         law = "knee" if mean > least and visible else "bingham"
-        better = sum(row.W_s_knee < row.W_s_bingham for row, _ in found)
+        better = sum(row.W_s_knee < row.W_s_bingham for row, _, _ in found)
         reason = (
             f"{comparison}; better in {better} of {count}, by {np.exp(mean):.3g} in the geometric mean where chance "
         )
         reason += f"makes up to {np.exp(least):.3g}"
         reason += "" if visible or mean <= 0.0 else f", and by less than {MISFIT_THRESHOLD:.2%} of peak"
-    bingham, knee = pooled or (None, None)
-    return LawRow(setting=setting, law=law, tests=count, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
-
-
-def _mean_log_ratio(squares: Array) -> tuple[float, float]:
-    """Compute the mean log ratio of the errors of both laws over the tests, and what chance makes it at most.
-
-    Parameters
-    ----------
-    squares : (n, 4) of `held_out_predictions`
-    """
-    from scipy.special import ndtr, stdtrit
-
-    bingham, knee, _, unseen = squares.T
-    ratios = np.log((bingham + unseen) / (knee + unseen))
-    errors = float(stdtrit(len(ratios) - 1, ndtr(SIGNIFICANT_ERRORS)))
-    return float(ratios.mean()), errors * float(np.std(ratios, ddof=1) / np.sqrt(len(ratios)))
+    pooled = {"W_s_bingham": bingham.criterion, "W_s_knee": knee.criterion}
+    return LawRow(setting=setting, law=law, tests=count, **pooled, reason=reason)
 
 
 # --- Force per click and per unit ---

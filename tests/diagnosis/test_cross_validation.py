@@ -12,10 +12,11 @@ from pzd.artefacts import Prediction
 from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cross_validation_of, predicts_worse
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.verdict import no_prediction_note
+from pzd.fit.cross_validation import PredictionError, predicts_worse
 from pzd.record import Record
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))

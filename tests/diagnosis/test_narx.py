@@ -10,12 +10,13 @@ import pytest
 from synthetic import TWO, damper_of, sine, sines, waveform
 
 from pzd.diagnosis import narx
-from pzd.diagnosis.cross_validation import PredictionError, assign_folds
+from pzd.diagnosis.cross_validation import assign_folds
 from pzd.diagnosis.data import prepare
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.narx import Order
 from pzd.diagnosis.peer_comparison import UNSTABLE, BlackBox, HeldOutTests
 from pzd.diagnosis.peers import StrokeMotion
+from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array, Record
 
 STEP = 0.005

@@ -16,10 +16,11 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import PredictionError, assign_folds, cross_validation_of
+from pzd.diagnosis.cross_validation import assign_folds, cross_validation_of
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.peer_comparison import HeldOutTests, PeerData, PeerFit, between_voltages, fit_peer
 from pzd.diagnosis.peers import Peer, PeerForm, StrokeMotion, peers
+from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 

@@ -28,7 +28,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.verdict import knee_verdict
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.knee import TRADE_SPEEDS, force_changes, identify_knees, law_row
+from pzd.identification.knee import TRADE_SPEEDS, HeldOutLaws, force_changes, identify_knees, law_row
 from pzd.identification.stage import identify
 from pzd.parallel.processes import no_listener
 from pzd.quantities import Control
@@ -208,17 +208,15 @@ def test_a_setting_whose_control_signal_always_moves_has_no_knee_law() -> None:
     assert "constant control signal" in law.reason
 
 
-def predicted(
-    apart: float, count: int, scatter: float = 0.0, unseen: float = 0.001
-) -> list[tuple[PredictedRow, Array]]:
+def predicted(apart: float, count: int, scatter: float = 0.0, unseen: float = 0.001) -> list[HeldOutLaws]:
     """Tests that Bingham misses by so much more than the knee law, give or take."""
-    rows = []
+    rows: list[HeldOutLaws] = []
     for i in range(count):
         bingham = 0.02 + apart + scatter * (-1) ** i
         row = PredictedRow(
             record=f"r{i}", setting=None, voltage_V=None, temperature_degC=None, W_s_bingham=bingham, W_s_knee=0.02
         )
-        rows.append((row, np.array([bingham, 0.02, 1.0, unseen])))
+        rows.append((row, (bingham, 1.0, 1.0, unseen), (0.02, 1.0, 1.0, unseen)))
     return rows
 
 
@@ -237,7 +235,8 @@ def test_every_test_counts_alike_however_slow() -> None:
         both = {"W_s_bingham": bingham, "W_s_knee": bingham / ratio}
         row = PredictedRow(record=name, setting=None, voltage_V=None, temperature_degC=None, **both)
         energy = 1.0 if name == "slow" else 1e4
-        rows.append((row, energy * np.array([bingham, bingham / ratio, 1.0, 1e-6])))
+        entries = [tuple(energy * each for each in (error, 1.0, 1.0, 1e-6)) for error in both.values()]
+        rows.append((row, entries[0], entries[1]))
     law = law_row("auto", None, rows, 1)
     assert law.law == "knee"
     assert "better in 5 of 5" in law.reason

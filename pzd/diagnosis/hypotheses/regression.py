@@ -15,20 +15,18 @@ import numpy as np
 from pzd.damper.confounders import known
 from pzd.damper.element import STIFFEST
 from pzd.damper.model import Damper
-from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import nearest_row
-from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, assign_folds, standard_error
+from pzd.diagnosis.cross_validation import CrossValidation, assign_folds
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.gap import ResidualCheck, jump_bend
 from pzd.diagnosis.hypotheses.shapes import Shape, Signals, shapes_of, signals_of
+from pzd.fit.cross_validation import FEWEST_TESTS, STANDARD_ERRORS, PredictionError, paired_t, squared_sums
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 MOST_SHAPES = 3
 """Most shapes reported together: more would fit anything."""
-FEWEST_TESTS = 3
-"""Fewest held-out tests, or halves, whose scatter says anything."""
 SAME_DIRECTION = 1e-9
 """Relative singular value below which two columns are one."""
 MOST_SAMPLES = 3000
@@ -151,6 +149,9 @@ class Regression:
     def predicting(self, candidates: Sequence[CandidateShape]) -> PredictingShapes | None:
         """Return what a set of shapes predicts; None where the last adds nothing visible beyond two standard errors.
 
+        A shape is a hint and names nothing: as in `predicts_better` two standard errors are enough. The weights set the
+        noise of each test apart, which the errors of parts of a test do not.
+
         Equation: mean d > 2 s_d / sqrt(n), d_i = w_i (e_i before - e_i after)         Source: paired differences
         """
         before, after = self.held_out_error(candidates[:-1]), self.held_out_error(candidates)
@@ -158,11 +159,9 @@ class Regression:
             return None
         baseline = self.held_out_error(())
         weight, noise = (np.array([getattr(p, name) for p in self.parts]) for name in ("weight", "noise"))
-        better = weight * (before.error - after.error)
-        scatter = standard_error(better)
-        errors = float(better.mean()) / scatter if scatter > 0.0 else np.inf
+        errors = paired_t(weight * (before.error - after.error))
         gap = float(weight @ np.maximum(baseline.error - noise, 0.0))
-        if errors <= thresholds.PREDICTION_STANDARD_ERRORS or gap <= 0.0:
+        if errors <= STANDARD_ERRORS or gap <= 0.0:
             return None
         closes = float(weight @ (baseline.error - after.error)) / gap
         return PredictingShapes(tuple(candidates), after, min(closes, 1.0), errors)
@@ -302,12 +301,13 @@ class Residuals:
 
     def _part(self, record: int, fold: int, test: RecordResidual, columns: Array, counts: Mask) -> RecordProducts:
         force = test.check.prepared.record.force[counts]
+        _, energy, spread = squared_sums(force, test.check.residual[counts])
         return RecordProducts(
             record=record,
             fold=fold,
             products=test.products(columns, counts),
-            energy=float(force @ force),
-            spread=float(np.sum((force - force.mean()) ** 2)),
+            energy=energy,
+            spread=spread,
             negligible=force.size * (self.validation.visible * test.check.peak) ** 2,
             noise=force.size * test.check.variance,
             weight=1.0 / test.noise,
