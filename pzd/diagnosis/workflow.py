@@ -29,7 +29,7 @@ from pzd.diagnosis.campaign import Campaign, Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord
-from pzd.diagnosis.fit.least_squares import LEVEL, base_half_widths, fit, refit, standard_errors
+from pzd.diagnosis.fit.least_squares import base_half_widths, fit, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
@@ -47,6 +47,7 @@ from pzd.diagnosis.verdict import (
     knee_verdict,
     no_prediction_note,
 )
+from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
 from pzd.identification.condition import parameter_row
 from pzd.identification.config import IdentifyConfig

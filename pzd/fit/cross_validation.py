@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.fit.intervals import student_quantile
 from pzd.record import Array
 
 FOLDS = 5
@@ -216,9 +217,11 @@ def student_errors(differences: int) -> float:
     >>> round(student_errors(3), 2), round(student_errors(1000), 2)
     (4.53, 2.0)
     """
-    from scipy.special import ndtr, stdtrit
+    from scipy.special import ndtr
 
-    return float(stdtrit(differences - 1, ndtr(STANDARD_ERRORS))) if differences >= FEWEST_DIFFERENCES else 0.0
+    if differences < FEWEST_DIFFERENCES:
+        return 0.0
+    return float(student_quantile(differences - 1.0, float(ndtr(STANDARD_ERRORS))))
 
 
 def log_ratios(one: PredictionError, other: PredictionError) -> Array:

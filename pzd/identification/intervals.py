@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from pzd.fit.intervals import UNINFORMATIVE, inverse_normal, student_quantile
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
 from pzd.parallel.on_disk import beside, one_at_a_time
@@ -37,8 +38,6 @@ HIDDEN_FORCE = 5e-4
 0.5, and less than a few cycles show under 1 % of noise."""
 HIDDEN_FORCE_LIMIT = 0.005
 """Largest force of the hidden law, r.m.s. as a share of peak: half a percent is little for any damper."""
-UNINFORMATIVE = 1e-6
-"""Expected disagreement of the tests, as a share of the variance, below which they tell nothing of the sensors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,20 +65,18 @@ def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 
     -------
     (p,) half widths, infinite for a parameter that the force does not depend on
     """
-    from scipy.special import stdtrit
-
     size = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in one_at_a_time(records)))
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
     slopes = [beside(r.slopes / size, r.record.force) for r in one_at_a_time(records)]
     grams = [s.T @ s for s in one_at_a_time(slopes)]
-    bread: Array = np.linalg.pinv(np.sum(grams, axis=0), rcond=1e-14, hermitian=True)
+    bread = inverse_normal(np.sum(grams, axis=0))
     noise = _noise_variance(records, slopes, bread)
     sensors = _sensor_variance(records, slopes, bread, noise)
     samples = sum(r.residuals.size for r in records)
     absorbed = misfit.absorbed**2 * samples * np.diag(bread) + _hidden_law_variance(records, slopes, bread)
     together = _sum_of_variances([noise, sensors, _Variance(absorbed, np.full(size.size, np.inf))])
-    quantile = stdtrit(np.maximum(together.freedom, 1.0), 0.5 + 0.5 * level)
+    quantile = student_quantile(together.freedom, 0.5 + 0.5 * level)
     widths: Array = quantile * np.sqrt(together.variance) / size
     return np.where(unseen, np.inf, widths)
 
@@ -260,10 +257,8 @@ class Uncertainty:
 
     def half_widths(self, level: float = 0.95) -> Array:
         """Return the half widths (p,) of the two-sided intervals."""
-        from scipy.special import stdtrit
-
-        quantile = float(stdtrit(max(self.degrees_of_freedom, 1.0), 0.5 + 0.5 * level))
-        return quantile * np.sqrt(np.diag(self.covariance))
+        quantile = student_quantile(self.degrees_of_freedom, 0.5 + 0.5 * level)
+        return np.asarray(quantile * np.sqrt(np.diag(self.covariance)))
 
 
 def uncertainty(records: Sequence[tuple[Array, Array]]) -> Uncertainty:
@@ -292,7 +287,7 @@ def uncertainty(records: Sequence[tuple[Array, Array]]) -> Uncertainty:
         meat += noise.innovation * filtered.T @ filtered
         independent += residuals.size * _independent_share(noise)
         samples += residuals.size
-    bread = np.linalg.pinv(bread, rcond=1e-14, hermitian=True)
+    bread = inverse_normal(bread)
     small_sample = samples / max(samples - size.size, 1)
     covariance = small_sample * bread @ meat @ bread / np.outer(size, size)
     covariance[unseen, unseen] = np.inf

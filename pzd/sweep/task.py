@@ -20,7 +20,7 @@ from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, RunConfig, Scatter, SweepConfig, validated
 from pzd.damper.confounders import known
 from pzd.damper.model import PHYSICAL, BaseRow, Damper
-from pzd.diagnosis.fit.least_squares import LEVEL
+from pzd.fit.intervals import LEVEL
 from pzd.parallel.chunks import TRIES
 from pzd.pipeline.command import Opened, opened
 from pzd.pipeline.execution import InMemory, unaffected

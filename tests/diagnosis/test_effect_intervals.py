@@ -12,9 +12,10 @@ from synthetic import damper_of, sine
 from pzd.damper.effects import library
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.data import prepare, split
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, base_half_widths, disagreement, fit, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, base_half_widths, fit, standard_errors
 from pzd.diagnosis.fit.problem import Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian
+from pzd.fit.intervals import LEVEL, disagreement
 from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -57,7 +58,8 @@ def by_noise_alone(fitted: FitResult) -> Array:
 
 def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(rng: np.random.Generator) -> None:
     # Chi-square of eight degrees of freedom over eight: sd 0.5 a draw, 0.025 of the mean of 400; 4.5 sd.
-    found = [disagreement(linear(rng, 0.0)[0], OF_EFFECT)[0] for _ in range(DRAWS)]
+    fits = [linear(rng, 0.0)[0] for _ in range(DRAWS)]
+    found = [disagreement(np.split(f.jacobian.dense(), TESTS), f.residuals, f.covariance, OF_EFFECT)[0] for f in fits]
     assert np.mean(found) == pytest.approx(1.0, abs=0.12)
 
 

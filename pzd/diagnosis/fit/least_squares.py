@@ -16,6 +16,7 @@ from pzd.damper.model import Damper
 from pzd.diagnosis.fit.problem import Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
 from pzd.fit.element_coordinates import ElementCoordinates
+from pzd.fit.intervals import LEVEL, covariance, disagreement, widening
 from pzd.fit.least_squares import Optimum, minimise
 from pzd.record import Array
 
@@ -94,7 +95,7 @@ class FitResult:
     @cached_property
     def covariance(self) -> Array:
         """(3 b + e, 3 b + e) covariance of the search variables by noise alone; infinite where no test shows one."""
-        return _covariance(np.concatenate([self.jacobian.dense(), self.prior]))
+        return covariance(np.concatenate([self.jacobian.dense(), self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -231,24 +232,7 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
     return np.concatenate([low.ravel(), bounds[:, 0]]), np.concatenate([high.ravel(), bounds[:, 1]])
 
 
-def _covariance(jacobian: Array) -> Array:
-    """Return the (p, p) covariance of the search variables; infinite where no residual shows one."""
-    size = np.linalg.norm(jacobian, axis=0)
-    unconstrained = size == 0.0
-    size[unconstrained] = 1.0
-    scaled = jacobian / size
-    whole: Array = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
-    whole[unconstrained, unconstrained] = np.inf
-    return whole
-
-
 # --- Standard errors and intervals
-
-
-LEVEL = 1.96
-"""Half width of a 95 % interval in standard errors."""
-UNINFORMATIVE = 1e-6
-"""Share of chance in a test's pull on a parameter, below which the test says nothing of disagreement."""
 
 
 def standard_errors(fitted: FitResult) -> Array:
@@ -256,7 +240,7 @@ def standard_errors(fitted: FitResult) -> Array:
 
     They are wider where the fit leaves more than noise or the tests disagree.
 
-    Equation: s_j^2 = C_jj max(1, |r|^2 / (n - p), R_j)             Source: Birge 1932, Phys. Rev. 40, 207
+    Equation: s_j^2 = C_jj w_j, w as in `pzd.fit.intervals.widening`
     """
     of_effects = slice(fitted.optimum.size - len(fitted.unknowns), fitted.optimum.size)
     searched = fitted.optimum[of_effects]
@@ -281,25 +265,7 @@ def base_half_widths(fitted: FitResult, coordinates: ElementCoordinates) -> Arra
 
 def search_errors(fitted: FitResult, of: slice) -> Array:
     """Compute the standard errors of some variables in the units of the search; see `standard_errors`."""
-    freedom = max(fitted.size - fitted.optimum.size, 1)
-    wider = np.maximum(disagreement(fitted, of), max(1.0, fitted.misfit / freedom))
+    slopes = np.split(fitted.jacobian.dense(), np.cumsum([r.size for r in fitted.residuals])[:-1])
+    apart = disagreement(slopes, fitted.residuals, fitted.covariance, of)
+    wider = widening(apart, fitted.misfit, fitted.size - fitted.optimum.size)
     return np.asarray(np.sqrt(np.diag(fitted.covariance)[of] * wider))
-
-
-def disagreement(fitted: FitResult, of: slice) -> Array:
-    """Compute how far the tests pull some parameters apart, relative to what noise alone lets them: about one.
-
-    Equation: R = sum_t c_t^2 / sum_t var c_t, c_t = C J_t' r_t, var c_t = C J_t' (I - J_t C J_t') J_t C
-                        Source: cluster-robust variance over its expectation; Bell and McCaffrey 2002, Surv. Meth. 28
-    """
-    covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
-    ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
-    pulled, allowed = np.zeros(of.stop - of.start), np.zeros(of.stop - of.start)
-    for slopes, residual in zip(np.split(fitted.jacobian.dense(), ends), fitted.residuals, strict=True):
-        pull = slopes @ covariance[:, of]
-        own, shared = np.sum(pull**2, axis=0), slopes.T @ pull
-        chance = own - np.sum(shared * (covariance @ shared), axis=0)
-        counts = chance > UNINFORMATIVE * own
-        pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
-        allowed += np.where(counts, chance, 0.0)
-    return np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)

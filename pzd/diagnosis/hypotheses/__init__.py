@@ -14,9 +14,9 @@ import numpy as np
 from pzd.artefacts import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.damper.model import Damper
 from pzd.diagnosis.cross_validation import CrossValidation
-from pzd.diagnosis.fit.least_squares import LEVEL
 from pzd.diagnosis.hypotheses.regression import PredictingShapes, RecordResidual, Residuals, residuals_of
 from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, Shape
+from pzd.fit.intervals import LEVEL
 from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.errors import ConfigError

@@ -14,13 +14,14 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit import least_squares
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult
+from pzd.diagnosis.fit.least_squares import FitResult
 from pzd.diagnosis.fit.likelihood import prompt_force, shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, late_instead_of_elastic, starts_of, towards_neutral
 from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 from pzd.signals.measures import rms
 

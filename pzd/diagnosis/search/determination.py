@@ -15,9 +15,10 @@ import numpy as np
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
-from pzd.diagnosis.fit.least_squares import LEVEL, FitResult, search_errors, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, search_errors, standard_errors
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 from pzd.signals.measures import rms
 

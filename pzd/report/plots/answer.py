@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array, Record
 from pzd.report.blocks import amount, listed, number, shortened, spelled
 from pzd.report.context import ReportContext
@@ -84,9 +85,6 @@ def _one_cycle(context: ReportContext, record: Record) -> tuple[Array, ...]:
 
 # --- What closes the gap ---
 
-_NORMAL_95 = 1.96
-"""Half-width of a 95 % interval in standard errors."""
-
 
 _MOST_CANDIDATES = 5
 """Candidates that are drawn: those behind are in the ranking."""
@@ -129,7 +127,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
         label.set_fontstyle("italic")
     ax.tick_params(axis="y", length=0.0)
     ax.set_ylim(len(rows) - 0.4, -0.6)
-    longest = max(_percent(bar.w_s + _NORMAL_95 * (bar.error or 0.0)) for bar in (*held_out, *candidates))
+    longest = max(_percent(bar.w_s + LEVEL * (bar.error or 0.0)) for bar in (*held_out, *candidates))
     strokes = [_percent(value) for bar in held_out for value in bar.each]
     right = 1.2 * longest if not strokes else max(1.2 * longest, min(1.05 * max(strokes), _MOST_BEYOND * longest))
     ax.set_xlim(0.0, right)
@@ -179,7 +177,7 @@ def _draw_bar(ax: Axes, place: int, bar: _Bar) -> None:
     length, right = _percent(bar.w_s), _percent(bar.w_s)
     ax.barh(place, length, color=bar.colour, height=_BAR)
     if bar.error is not None:
-        ends = [_percent(max(bar.w_s + side * _NORMAL_95 * bar.error, 0.0)) for side in (-1.0, 1.0)]
+        ends = [_percent(max(bar.w_s + side * LEVEL * bar.error, 0.0)) for side in (-1.0, 1.0)]
         whisker = [[length - ends[0]], [ends[1] - length]]
         ax.errorbar([length], [place], xerr=whisker, color="black", capsize=3.0, linewidth=1.1)
         right = ends[1]

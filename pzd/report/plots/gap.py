@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array, Record
 from pzd.report.blocks import number, shortened, spelled
 from pzd.report.context import ReportContext
@@ -15,8 +16,6 @@ from pzd.signals.measures import criterion
 
 # --- Before and after, on held-out data ---
 
-_NORMAL_95 = 1.96
-"""Half-width of a 95 % interval in standard errors."""
 _MOST_RECORDS = 16
 """Held-out records that are drawn: a picture stays readable on one screen."""
 
@@ -34,7 +33,7 @@ def held_out_gap(context: ReportContext) -> Iterator[Panel]:
     labels = [bar[0] for bar in bars]
     figure, ax = axes("W_s on held-out data [-]", height=1.0 + 0.4 * len(bars), labels=labels, key=0, right=0.3)
     ax.barh([b[0] for b in bars], [b[1] for b in bars], color=[b[2] for b in bars], height=0.6)
-    whisker = [_NORMAL_95 * gap.standard_error]
+    whisker = [LEVEL * gap.standard_error]
     ax.errorbar([last[1]], [last[0]], xerr=whisker, color="black", capsize=3.0, linewidth=1.0)
     for i, bar in enumerate(bars):
         lift = 8 if bar is last else 0  # clear of the whisker

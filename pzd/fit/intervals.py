@@ -1,0 +1,104 @@
+"""Covariance of a least-squares estimate, how far tests disagree about it, and quantiles of its intervals.
+
+Two weights of the one least squares need two covariances. Where residuals are in units of noise (diagnose, changes) it
+is the inverse of the normal matrix, wider by what the fit leaves and by what tests disagree. By criterion (4), where
+samples weigh alike whatever their noise (identify), it is the sandwich of `pzd.identification.intervals`, whose outer
+factors are the same inverse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pzd.record import Array
+
+LEVEL = 1.96
+"""Half width of a 95 % interval in standard errors."""
+SINGULAR = 1e-13
+"""Eigenvalue of a normal matrix scaled to a unit diagonal, relative to the largest, below which it shows no direction.
+
+Reason: rounding in the sums of squares of some thousand samples (1e-16 each) goes so far."""
+UNINFORMATIVE = 1e-6
+"""Share of chance in a test's pull on a parameter, below which the test says nothing of disagreement."""
+
+
+def inverse_normal(normal: Array) -> Array:
+    """Compute the generalised inverse (p, p) of a normal matrix J' J, whatever the units of the parameters.
+
+    Examples
+    --------
+    >>> inverse_normal(np.diag([4.0, 0.0, 0.25])).diagonal().tolist()
+    [0.25, 0.0, 4.0]
+    """
+    size = np.sqrt(np.diag(normal))
+    size = np.where(size > 0.0, size, 1.0)
+    scale = np.outer(size, size)
+    return np.asarray(np.linalg.pinv(normal / scale, rcond=SINGULAR, hermitian=True) / scale)
+
+
+def covariance(jacobian: Array) -> Array:
+    """Compute the covariance (p, p) of the variables from (n, p) derivatives of residuals in units of noise.
+
+    Infinite where no residual shows a variable.
+
+    Equation: (J' J)^-1
+    """
+    normal = jacobian.T @ jacobian
+    found, unseen = inverse_normal(normal), np.diag(normal) == 0.0
+    found[unseen, unseen] = np.inf
+    return found
+
+
+def disagreement(slopes: Sequence[Array], residuals: Sequence[Array], whole: Array, of: slice = slice(None)) -> Array:
+    """Compute how far the tests pull some parameters apart, relative to what noise alone lets them: about one.
+
+    Equation: R = sum_t c_t^2 / sum_t var c_t, c_t = C J_t' r_t, var c_t = C J_t' (I - J_t C J_t') J_t C
+                        Source: cluster-robust variance over its expectation; Bell and McCaffrey 2002, Surv. Meth. 28
+
+    Parameters
+    ----------
+    slopes, residuals : (n, p) and (n,) of each test, in units of noise
+    whole : (p, p) their covariance C, which may be infinite
+    of : the parameters asked for
+    """
+    known = np.where(np.isfinite(whole), whole, 0.0)
+    pulled, allowed = np.zeros(known[of].shape[0]), np.zeros(known[of].shape[0])
+    for own, residual in zip(slopes, residuals, strict=True):
+        pull = own @ known[:, of]
+        alone, shared = np.sum(pull**2, axis=0), own.T @ pull
+        chance = alone - np.sum(shared * (known @ shared), axis=0)
+        counts = chance > UNINFORMATIVE * alone
+        pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
+        allowed += np.where(counts, chance, 0.0)
+    return np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)
+
+
+def widening(disagree: Array, squares: float, freedom: int) -> Array:
+    """Return the factor (p,) on variances by noise alone: by what the fit leaves, or by what tests disagree.
+
+    Equation: max(1, |r|^2 / (n - p), R_j)                                  Source: Birge 1932, Phys. Rev. 40, 207
+
+    Parameters
+    ----------
+    disagree : (p,) by `disagreement`
+    squares : sum of squared residuals in units of noise
+    freedom : residuals less parameters
+    """
+    return np.maximum(disagree, max(1.0, squares / max(freedom, 1)))
+
+
+def student_quantile(freedom: Array | float, probability: float) -> Array:
+    """Return below what Student's t lies with a probability; of less than one degree of freedom that of one.
+
+    Source: Student 1908
+
+    Examples
+    --------
+    >>> student_quantile(np.inf, 0.975).round(2) == LEVEL
+    np.True_
+    """
+    from scipy.special import stdtrit
+
+    return np.asarray(stdtrit(np.maximum(freedom, 1.0), probability))
