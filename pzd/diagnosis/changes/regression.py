@@ -18,6 +18,7 @@ import numpy as np
 
 from pzd.diagnosis.changes.candidates import Candidate, Coordinate, Response
 from pzd.diagnosis.changes.pairs import Comparison, octave_mean, stacked
+from pzd.fit.intervals import LEVEL, disagreement, inverse_normal, widening
 from pzd.record import Array, Complex
 from pzd.signals.nuisance import NUISANCE_LIMIT, NuisanceConfig
 
@@ -39,8 +40,6 @@ EVALUATIONS = 12
 """Evaluations of a fit at most; each is a simulation of all comparisons for each coordinate."""
 ROUNDS = 3
 """Fits with the scatter that the last one left, at most."""
-LEVEL = 1.96
-"""Half width of a 95 % interval in standard errors."""
 
 
 @dataclass(frozen=True)
@@ -282,24 +281,13 @@ class Regression:
     def covariance(self, fitted: Fitted) -> Array:
         """Compute the (p, p) covariance of the coordinates, wider where the tests disagree by more than the scatter.
 
-        Equation: (J' J)^-1 max(1, |r|^2 / (n - p), R_j), R_j of the tests' pulls
-                                            Source: Birge 1932; cluster-robust variance, Bell and McCaffrey 2002
+        Equation: (J' J)^-1 w_j, w as in `pzd.fit.intervals.widening`
         """
         whiteners = self.likelihood.whiteners(fitted.scatter)
         J = self.jacobian(fitted.coordinates, fitted.values, whiteners)
-        covariance = np.linalg.pinv(J.T @ J, rcond=1e-13, hermitian=True)
+        covariance = inverse_normal(J.T @ J)
         r = [W @ each for W, each in zip(whiteners, fitted.residuals, strict=True)]
         whole = np.concatenate(r)
-        wider = max(1.0, float(whole @ whole) / max(whole.size - fitted.values.size, 1))
-        ends = np.cumsum([each.size for each in r])[:-1]
-        pulled, allowed = np.zeros(J.shape[1]), np.zeros(J.shape[1])
-        for own, residual in zip(np.split(J, ends), r, strict=True):
-            pull = own @ covariance
-            alone, shared = np.sum(pull**2, axis=0), own.T @ pull
-            chance = alone - np.sum(shared * (covariance @ shared), axis=0)
-            counts = chance > 1e-6 * alone
-            pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
-            allowed += np.where(counts, chance, 0.0)
-        disagree = np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)
-        spread = np.sqrt(np.maximum(disagree, wider))
+        apart = disagreement(np.split(J, np.cumsum([each.size for each in r])[:-1]), r, covariance)
+        spread = np.sqrt(widening(apart, float(whole @ whole), whole.size - fitted.values.size))
         return np.asarray(covariance * np.outer(spread, spread))

@@ -14,8 +14,9 @@ import numpy as np
 
 from pzd.damper.confounders import known
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
-from pzd.diagnosis.changes.regression import LEVEL, USUAL_SHARE, Fitted, Regression, Scatter
+from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 
 MOST_CHANGES = 4
