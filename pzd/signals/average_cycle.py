@@ -128,23 +128,23 @@ class AverageCycle:
         return np.asarray(max(self.corner, distorted) / np.maximum(np.arange(self.harmonics.size), 1.0) ** 4)
 
     @cached_property
-    def distortion(self) -> tuple[NDArray[np.complex128], Array]:
-        """(H + 1,) harmonics that a drive may have added where steps hide them [m], and the power unknown of them.
+    def hidden_by_steps(self) -> tuple[NDArray[np.complex128], Array]:
+        """(H + 1,) harmonics that steps of the channel hide, as corners or the drive make them [m], and power unknown.
 
-        A harmonic that steps know worse than the drive makes it is none, and all its power is unknown.
+        A harmonic that steps know worse than what is expected is none, and all of that is unknown.
 
-        Equation: c' = w c, s'^2 = w s^2, w = t^2 / (t^2 + s^2), t the drive's; t < s: c' = 0, s'^2 = t^2
+        Equation: c' = w c, s'^2 = w s^2, w = t^2 / (t^2 + s^2), t^2 as in `expected`; t < s: c' = 0, s'^2 = t^2
                                                                             Source: normal prior, normal error
         """
-        drive = np.where(np.arange(self.harmonics.size) < max(self.resolved, 2), 0.0, self.expected)
-        known = drive >= self.variance
-        share = drive / np.maximum(drive + self.variance, np.finfo(np.float64).tiny)
-        return np.where(known, share * self.harmonics, 0.0), np.where(known, share * self.variance, drive)
+        prior = np.where(np.arange(self.harmonics.size) < max(self.resolved, 2), 0.0, self.expected)
+        known = prior >= self.variance
+        share = prior / np.maximum(prior + self.variance, np.finfo(np.float64).tiny)
+        return np.where(known, share * self.harmonics, 0.0), np.where(known, share * self.variance, prior)
 
     @cached_property
     def clear_harmonics(self) -> NDArray[np.complex128]:
-        """(H + 1,) harmonics that stand clear, over the whole cycle or in parts of it, or are of the drive [m]."""
-        return np.where(self.clear, self.harmonics, self._spectrum(self._in_parts[1])) + self.distortion[0]
+        """(H + 1,) harmonics that stand clear, over the whole cycle or in parts of it, or that steps hide [m]."""
+        return np.where(self.clear, self.harmonics, self._spectrum(self._in_parts[1])) + self.hidden_by_steps[0]
 
     def _noise(self, draw: np.random.Generator) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Draw (H + 1,) noise, and return it with what `clear_harmonics` would keep of it."""
@@ -156,7 +156,7 @@ class AverageCycle:
 
     @cached_property
     def left_out(self) -> Array:
-        """(H + 1,) power of the motion in what is not kept: of neighbouring harmonics above noise, or of the drive."""
+        """(H + 1,) power of the motion in what is not kept: of neighbours above noise, or of what steps hide."""
         drawn = [self._noise(draw) for draw in np.random.default_rng(LEFT_OUT_DRAWS).spawn(LEFT_OUT_DRAWS)]
         noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
         counted = ~self.clear & (np.arange(noise.size) < self.resolved)
@@ -166,7 +166,7 @@ class AverageCycle:
         sums, squares, counts = (each[high + 1] - each[low] for each in added)
         many = np.maximum(counts, 1.0)
         found = positive_mean(sums / many, np.sqrt(np.maximum(squares, 0.0)) / many, self.expected)
-        return np.asarray(np.where(counted, found, self.distortion[1]))
+        return np.asarray(np.where(counted, found, self.hidden_by_steps[1]))
 
     def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
         """Draw (3 H + 1,) an error of `clear_harmonics`: noise in what is kept, what is left out and what is beyond."""
