@@ -20,7 +20,7 @@ from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import refit
-from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names
+from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names, improves
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
 from pzd.fit.cross_validation import PredictionError
@@ -28,6 +28,7 @@ from pzd.fit.cross_validation import PredictionError
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
 ADDED = "added: kept-back tests are predicted better with it; what it stands for is open"
+NO_BETTER = "something is still missed, and kept-back tests are predicted no better with it"
 REPLACED = "stand-in: kept-back tests are predicted as well without it, beside what was added"
 
 
@@ -170,13 +171,7 @@ def _without_effect(selection: Selection, effect: str, reason: str = WORSENS_PRE
     fewer = selection.fitted.damper.without_effects(effect)
     reasons = {**selection.reasons, effect: reason}
     if not fewer.effects:
-        return replace(
-            selection,
-            fitted=selection.baseline,
-            final_evidence=selection.initial_evidence,
-            competing_confounders=(),
-            reasons=reasons,
-        )
+        return _plain(selection, reasons)
     evidence = evidence_of(selection.final_evidence.campaign, fewer)
     return replace(
         selection,
@@ -184,6 +179,17 @@ def _without_effect(selection: Selection, effect: str, reason: str = WORSENS_PRE
         final_evidence=evidence,
         competing_confounders=tuple(c for c in selection.competing_confounders if c.effect != effect),
         reasons=reasons,
+    )
+
+
+def _plain(selection: Selection, reasons: Mapping[str, str]) -> Selection:
+    """Return the baseline in the place of what was selected."""
+    return replace(
+        selection,
+        fitted=selection.baseline,
+        final_evidence=selection.initial_evidence,
+        competing_confounders=(),
+        reasons=dict(reasons),
     )
 
 
@@ -236,7 +242,8 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
     before = CriterionFit(*found, adoption.error, adoption.interpolation_error)
     search = PredictiveSearch(validation, config, len(selection.adopted) + config.most_added)
     final = search.improve(before)
-    if final is before:
+    # Each step improves on the one before it, and then removes what its prediction does not need: the sum is judged.
+    if final is before or not improves(final.error, before.error, validation):
         return replace(adoption, alternatives=search.alternatives)
     had, has = (effect_names(each.fitted.damper) for each in (before, final))
     new = {name: ADDED for name in final.fitted.effects if name not in selection.adopted}
@@ -250,3 +257,24 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
     errors = adoption.baseline_error, final.error, final.interpolation_error
     added = tuple(name for name in has if name not in had)
     return Adoption(extended, *errors, by_criterion=True, added=added, alternatives=search.alternatives)
+
+
+def predicting(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Adoption:
+    """Return what is handed on where something has no name: the damper with effects only where it predicts better.
+
+    A gap that a name explains speaks for the effect by itself. Where a law is missing the likelihood bends each effect
+    towards it, and that held-out tests are predicted no worse is too little: the plain damper does that as well. So is
+    what some tests gain and others lose, for nobody knows which of them the next one is like.
+
+    Parameters
+    ----------
+    adoption : damper with what was selected, and added
+    validation : cross-validation of the tests
+    forced : effects that the config asks for, whatever they do
+    """
+    selection, plain = adoption.selection, adoption.baseline_error
+    better = improves(adoption.error, plain, validation) and not validation.much_worse_in(adoption.error, plain)
+    if not selection.adopted or forced or better:
+        return adoption
+    kept = _plain(selection, {**selection.reasons, **dict.fromkeys(selection.adopted, NO_BETTER)})
+    return Adoption(kept, plain, plain, validation.baseline_interpolation_error)

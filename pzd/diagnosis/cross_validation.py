@@ -102,9 +102,9 @@ def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
 # --- Comparison at left-out voltages
 
 
-def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
-    """Whether one damper predicts the tests of a left-out voltage visibly worse than another, and by half or more."""
-    much = thresholds.INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
+def predicts_much_worse(one: PredictionError, other: PredictionError) -> bool:
+    """Whether one damper predicts some tests, as those of a left-out voltage, visibly worse, and by half or more."""
+    much = thresholds.MUCH_WORSE * (other.criterion or 0.0)
     return other.visibly_below(one) and (one.criterion or 0.0) > much
 
 
@@ -239,6 +239,10 @@ class CrossValidation(Folds):
         """Return the voltages [V] at which one damper predicts better; all where only the whole shows it."""
         return self._voltages_where(predicts_better, one, other)
 
+    def much_worse_in(self, one: PredictionError, other: PredictionError) -> bool:
+        """Whether one damper predicts any single held-out test visibly worse than another, and by half or more."""
+        return any(predicts_much_worse(one.of_records([i]), other.of_records([i])) for i in {*one.records})
+
     def _voltages_where(
         self, holds: Callable[[PredictionError, PredictionError], bool], one: PredictionError, other: PredictionError
     ) -> tuple[float | None, ...]:
@@ -250,7 +254,7 @@ class CrossValidation(Folds):
         """Return the voltages [V] between others where the interpolation error is much larger than the baseline's."""
         both = error, self.baseline_interpolation_error
         pairs = {i: [each.of_records(self.groups[i]) for each in both] for i in self.interior_groups()}
-        return tuple(self.voltages[i] for i, pair in pairs.items() if interpolates_much_worse(*pair))
+        return tuple(self.voltages[i] for i, pair in pairs.items() if predicts_much_worse(*pair))
 
     def interior_groups(self) -> tuple[int, ...]:
         """Return the groups whose voltage lies between two others."""

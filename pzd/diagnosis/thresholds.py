@@ -121,12 +121,14 @@ MOST_REWEIGHTINGS = 5
 
 Reason: time; what swings between two optima would never end."""
 
-INTERPOLATION_ERROR_RATIO = 1.5
-"""Interpolation error at a left-out voltage, as a multiple of the baseline's, from which effects are not adopted.
+MUCH_WORSE = 1.5
+"""Error of a left-out voltage, or where something has no name of a held-out test, as a multiple of the baseline's, from
+which effects are not adopted.
 
-Reason: there the line between voltages misses more than any law, and with a true law, when T0 and C become those of the
-damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the same, tell chance. 7
-% more was seen with a true name, 2.9 times with a wrong one; not tuned."""
+Reason: of a left-out voltage, the line between voltages misses more than any law, and with a true law, when T0 and C
+become those of the damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the
+same, tell chance. 7 % more was seen with a true name, 2.9 times with a wrong one; not tuned. Of a test, beyond what its
+own offset, gain and delay usually do."""
 
 NEAR_LIMIT = 0.1
 """Distance from a limit of the search, in standard errors, within which a parameter ends at it.

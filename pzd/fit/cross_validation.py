@@ -245,15 +245,15 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
 
 
 def predicts_better(one: PredictionError, other: PredictionError) -> bool:
-    """Whether one model predicts better than another: visibly, and by two standard errors.
+    """Whether one model predicts better than another: visibly, and beyond chance however few the tests.
 
-    Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
-    verdict, and nothing speaks against it. The differences may be those of the logarithms too: an effect that shows
-    much in one test and little in another, and takes the same share of either error, is no chance.
+    The differences may be those of the logarithms too: an effect that shows much in one test and little in another, and
+    takes the same share of either error, is no chance.
     """
-    if _error_is_larger(other, one, STANDARD_ERRORS):
+    errors = student_errors(len(one.records))
+    if _error_is_larger(other, one, errors):
         return True
-    return one.visibly_below(other) and paired_t(log_ratios(one, other)) > STANDARD_ERRORS
+    return one.visibly_below(other) and paired_t(log_ratios(one, other)) > errors
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:

@@ -13,7 +13,15 @@ from synthetic import TWO, all_but, campaign_of, damper_of, sine, sines
 
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis.adoption import ADDED, REPLACED, Adoption, add_predictive_effects, adopt_effects
+from pzd.diagnosis.adoption import (
+    ADDED,
+    NO_BETTER,
+    REPLACED,
+    Adoption,
+    add_predictive_effects,
+    adopt_effects,
+    predicting,
+)
 from pzd.diagnosis.campaign import Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
@@ -21,6 +29,7 @@ from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.predictive_search import interpolation_check
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import candidates, per_voltage_candidates, starts_of
+from pzd.fit.cross_validation import PredictionError
 from pzd.record import Record
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
@@ -130,6 +139,26 @@ def test_effects_that_worsen_the_interpolation_are_removed(
     if found.rejection is not None:
         assert "those of a voltage left out are predicted worse" in found.rejection
         assert "W_s 1.7 against 1 at 150 V" in found.rejection
+
+
+@pytest.mark.parametrize(
+    ("shares", "kept"),
+    [((0.5,) * 8, True), ((1.0,) * 8, False), ((0.3,) * 7 + (1.4,), True), ((0.3,) * 7 + (1.6,), False)],
+    ids=["each by half", "no better", "one a little worse", "one much worse"],
+)
+def test_where_something_has_no_name_effects_are_handed_on_only_if_they_predict_better(
+    shares: tuple[float, ...], kept: bool, rng: np.random.Generator
+) -> None:
+    """What some tests gain and another loses is no prediction: nobody knows which of them the next one is like."""
+    named = selection(rng, asymmetry={"alpha": 0.1})
+    tests = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    plain = PredictionError(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
+    adoption = Adoption(named, plain, replace(plain, error=np.array(shares)), plain)
+    found = predicting(adoption, tests, ())
+    assert found.selection.adopted == (("asymmetry",) if kept else ())
+    assert found.error is (adoption.error if kept else plain)
+    assert (found.selection.reasons["asymmetry"] == NO_BETTER) is not kept
+    assert predicting(adoption, tests, ("asymmetry",)) is adoption
 
 
 def test_a_forced_effect_is_adopted_whatever_it_does(rng: np.random.Generator) -> None:

@@ -16,7 +16,7 @@ from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.verdict import no_prediction_note
-from pzd.fit.cross_validation import PredictionError, predicts_worse
+from pzd.fit.cross_validation import PredictionError, predicts_better, predicts_worse
 from pzd.record import Record
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
@@ -168,6 +168,17 @@ def test_chance_alone_predicts_worse_equally_rarely_for_any_number_of_tests(
     )
     expected = 8000 * 0.02275
     assert abs(found - expected) < 4.0 * np.sqrt(expected)
+
+
+@pytest.mark.parametrize("tests", [2, 3, 12])
+def test_chance_alone_predicts_better_rarely_for_any_number_of_tests(tests: int, rng: np.random.Generator) -> None:
+    """By the differences or by the ratios: of two tests that both fell a little, neither says more than that."""
+    ones = np.ones(tests)
+    plain = PredictionError(tuple(range(tests)), ones, 100.0 * ones, ones, 0.0 * ones)
+    found = sum(
+        predicts_better(replace(plain, error=1.0 + 0.1 * rng.standard_normal(tests)), plain) for _ in range(4000)
+    )
+    assert found < 1.5 * 4000 * 0.02275
 
 
 def test_an_invisible_increase_of_the_error_is_not_worse(rng: np.random.Generator) -> None:
