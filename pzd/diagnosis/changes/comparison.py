@@ -40,11 +40,12 @@ from pzd.diagnosis.changes.pairs import (
     stacked_variance,
     unstacked,
 )
-from pzd.diagnosis.changes.regression import LEVEL, Fitted, Likelihood, Regression
+from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
 from pzd.diagnosis.changes.state import State, about, diagnosed_state
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.next_test import operating_envelope, separating_test
+from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control

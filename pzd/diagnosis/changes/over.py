@@ -14,6 +14,7 @@ from pzd.diagnosis.changes.comparison import Findings, Verdict, findings_between
 from pzd.diagnosis.changes.pairs import averaged
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
+from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import Record, sliced
@@ -162,7 +163,7 @@ def _peak_force(state: State, velocity: float, side: float, voltage: float | Non
     speeds = [p[0] for p in points]
     if not points or not speeds[0] * 0.99 <= velocity <= speeds[-1] * 1.01:
         return None
-    half = [1.96 * p[2] / np.sqrt(p[3]) for p in points]
+    half = [LEVEL * p[2] / np.sqrt(p[3]) for p in points]
     return float(np.interp(velocity, speeds, [p[1] for p in points])), float(np.interp(velocity, speeds, half))
 
 
