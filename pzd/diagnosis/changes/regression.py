@@ -18,7 +18,8 @@ import numpy as np
 
 from pzd.diagnosis.changes.candidates import Candidate, Coordinate, Response
 from pzd.diagnosis.changes.pairs import Comparison, octave_mean, stacked
-from pzd.fit.intervals import LEVEL, disagreement, inverse_normal, widening
+from pzd.fit.intervals import LEVEL, covariance, disagreement, widening
+from pzd.fit.least_squares import minimise
 from pzd.record import Array, Complex
 from pzd.signals.nuisance import NUISANCE_LIMIT, NuisanceConfig
 
@@ -40,6 +41,8 @@ EVALUATIONS = 12
 """Evaluations of a fit at most; each is a simulation of all comparisons for each coordinate."""
 ROUNDS = 3
 """Fits with the scatter that the last one left, at most."""
+PRECISION = 1e-5
+"""Relative change at which a fit ends: the steps of the differences leave no more of the slopes."""
 
 
 @dataclass(frozen=True)
@@ -222,16 +225,12 @@ class Regression:
         start : (p,) values of the coordinates
         scatter : with which the fit begins
         """
-        from scipy.optimize import least_squares
-
         candidates = tuple(candidates)
         coordinates = coordinates_of(candidates)
         x = start
         if coordinates:
             low = np.array([c.low for c in coordinates])
             high = np.array([c.high for c in coordinates])
-            margin = 1e-9 * np.where(np.isfinite(high - low), high - low, 1.0)
-            x = np.clip(start, low + margin, high - margin)
             for _ in range(ROUNDS):
                 whiteners = self.likelihood.whiteners(scatter)
 
@@ -244,10 +243,7 @@ class Regression:
                 def slopes(x: Array, whiteners: list[Array] = whiteners) -> Array:
                     return -self.jacobian(coordinates, x, whiteners)
 
-                found = least_squares(
-                    residual, x, jac=slopes, bounds=(low, high), x_scale="jac", xtol=1e-5, ftol=1e-5, gtol=1e-8,
-                    max_nfev=EVALUATIONS,
-                )  # fmt: skip
+                found = minimise(residual, x, slopes, (low, high), precision=PRECISION, evaluations=EVALUATIONS)
                 x = found.x
                 left = self._left(coordinates, x)
                 new, _ = self.likelihood.best_scatter(left[1])
@@ -281,13 +277,13 @@ class Regression:
     def covariance(self, fitted: Fitted) -> Array:
         """Compute the (p, p) covariance of the coordinates, wider where the tests disagree by more than the scatter.
 
-        Equation: (J' J)^-1 w_j, w as in `pzd.fit.intervals.widening`
+        Equation: (J' J)^-1 max(1, |r|^2 / (n - p), R_j), R_j of the tests' pulls
+                                            Source: Birge 1932; cluster-robust variance, Bell and McCaffrey 2002
         """
         whiteners = self.likelihood.whiteners(fitted.scatter)
-        J = self.jacobian(fitted.coordinates, fitted.values, whiteners)
-        covariance = inverse_normal(J.T @ J)
+        J = [W @ own for W, own in zip(whiteners, self.columns(fitted.coordinates, fitted.values), strict=True)]
         r = [W @ each for W, each in zip(whiteners, fitted.residuals, strict=True)]
-        whole = np.concatenate(r)
-        apart = disagreement(np.split(J, np.cumsum([each.size for each in r])[:-1]), r, covariance)
-        spread = np.sqrt(widening(apart, float(whole @ whole), whole.size - fitted.values.size))
-        return np.asarray(covariance * np.outer(spread, spread))
+        alone = covariance(np.concatenate(J))
+        squares, freedom = float(sum(each @ each for each in r)), self.likelihood.size - fitted.values.size
+        spread = np.sqrt(widening(disagreement(J, r, alone), squares, freedom))
+        return np.asarray(alone * np.outer(spread, spread))

@@ -16,6 +16,7 @@ from pzd.damper.confounders import known
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
+from pzd.fit.cross_validation import SMALLEST_SINGULAR, folds_in_turn, held_out_residuals
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 
@@ -37,8 +38,6 @@ AS_GOOD = 2.0
 may make either leave so much."""
 SCALED = (0.05, 3.0)
 """Limits of the factor on a start by its linearised step."""
-FOLDS = 5
-"""Parts into which the tests are dealt for the prediction of held-out ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +91,22 @@ def _best_step(candidate: Candidate, columns: Array, r: Array) -> tuple[Array, A
     step = np.linalg.lstsq(columns[:, 1:] / size[1:], rest, rcond=1e-6)[0] / size[1:]
     step /= max(1.0, float(np.max(np.abs(step))))
     return rest - columns[:, 1:] @ step, np.concatenate([[1.0], step])
+
+
+def _held_out_error(slopes: Sequence[Array], residuals: Sequence[Array]) -> float:
+    """Return the sum of squares of what held-out tests leave about the linear fits without their folds.
+
+    Parameters
+    ----------
+    slopes, residuals : (n, p) and (n,) of each test, anywhere near the optimum
+    """
+    if not slopes[0].shape[1]:
+        return float(sum(r @ r for r in residuals))
+    step = np.linalg.lstsq(np.concatenate(slopes), np.concatenate(residuals), rcond=SMALLEST_SINGULAR)[0]
+    folds = folds_in_turn(len(slopes))
+    members = [[i for i, fold in enumerate(folds) if fold == each] for each in sorted(set(folds))]
+    left = held_out_residuals(slopes, [r - J @ step for J, r in zip(slopes, residuals, strict=True)], members)
+    return float(sum(r @ r for r in left))
 
 
 @dataclass(eq=False)
@@ -362,25 +377,12 @@ class Search:
         whiteners = self.regression.likelihood.whiteners(fitted.scatter)
         columns = self.regression.columns(fitted.coordinates, fitted.values)
         J = [W @ c for W, c in zip(whiteners, columns, strict=True)]
-        kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
-        target = [
-            W @ r + own[:, kept] @ fitted.values[kept] for W, r, own in zip(whiteners, fitted.residuals, J, strict=True)
-        ]
+        r = [W @ each for W, each in zip(whiteners, fitted.residuals, strict=True)]
         # Absent it makes no force, wherever its coordinates stand: that of a logarithm is no 0.
         absent = [W @ d for W, d in zip(whiteners, self._made_by(fitted, candidate), strict=True)]
-        gain = 0.0
-        for fold in range(min(FOLDS, tests)):
-            held = [i for i in range(tests) if i % FOLDS == fold]
-            seen = [i for i in range(tests) if i % FOLDS != fold]
-            A, b = np.concatenate([J[i] for i in seen]), np.concatenate([target[i] for i in seen])
-            B, y = np.concatenate([J[i] for i in held]), np.concatenate([target[i] for i in held])
-            full = y - B @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
-            b = b + np.concatenate([absent[i] for i in seen])
-            less = y + np.concatenate([absent[i] for i in held])
-            if kept.any():
-                less = less - B[:, kept] @ np.linalg.lstsq(A[:, kept], b, rcond=1e-10)[0]
-            gain += float(less @ less - full @ full)
-        return gain > 0.0
+        kept = np.array([c not in candidate.coordinates for c in fitted.coordinates])
+        less = _held_out_error([own[:, kept] for own in J], [a + b for a, b in zip(r, absent, strict=True)])
+        return less > _held_out_error(J, r)
 
     def rivals(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
