@@ -46,6 +46,7 @@ from pzd.diagnosis.verdict import (
     insufficient_data_diagnosis,
     knee_verdict,
     no_prediction_note,
+    no_slip_diagnosis,
 )
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
@@ -81,6 +82,8 @@ def diagnose_setting(
     baseline = base_of(identified.rows, setting)
     campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
+    if all(row.shows_oil_spring_alone for row in rows):
+        return Diagnosed(no_slip_diagnosis(rows), baseline, baseline, rows)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
