@@ -75,6 +75,7 @@ def diagnose_setting(
     if identified.knees.law_of(setting) == "knee":
         return knee_verdict(identified, setting, diagnose)
     records, saturated = data.unsaturated_records(rig, setting)
+    records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
     prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
@@ -94,7 +95,12 @@ def diagnose_setting(
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
-    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), data.saturation_note(saturated)
+    limits = (
+        hold_out_note(roles.hold_out),
+        no_prediction_note(prediction),
+        data.saturation_note(saturated),
+        data.drift_note(drift),
+    )
     final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
