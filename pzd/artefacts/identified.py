@@ -207,6 +207,7 @@ class ParameterRow(ConditionRow):
 
     T0_N: float | None = Field(ge=0.0)
     T0_N_low95: float | None
+    """Without a value: the force up to which no test slips."""
     T0_N_high95: float | None
     C_Ns_per_m: float | None = Field(ge=0.0)
     C_Ns_per_m_low95: float | None
@@ -221,6 +222,11 @@ class ParameterRow(ConditionRow):
     rmse_N: float = Field(ge=0.0)
     status: str = Field(pattern=r"^(ok|(weak|undetermined): [T0Ck, ]+.*)$")
     """`ok`, or `weak: T0 ...` / `undetermined: C, k ...` with the reason."""
+
+    @property
+    def shows_oil_spring_alone(self) -> bool:
+        """Whether no test of the condition slips, so that k is all that is known."""
+        return self.T0_N is None and self.T0_N_low95 is not None
 
     @model_validator(mode="after")
     def _inside_its_interval(self) -> ParameterRow:

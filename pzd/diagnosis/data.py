@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pzd.artefacts import Rig
 from pzd.record import Array, Record, conditions, distinct, is_constant, sliced, voltage_scale
 from pzd.signals.average_cycle import AverageCycle, Motion
-from pzd.signals.cycles import Cycles, cycles, settled_cycles
+from pzd.signals.cycles import Cycles, cycles, cycles_of, settled_cycles
 from pzd.signals.jumps import denoised_control
 from pzd.signals.measures import resolution
 from pzd.signals.segmentation import separate_tests
@@ -246,6 +246,46 @@ def unsaturated_records(rig: Rig, setting: str | None) -> tuple[list[Record], tu
 def saturation_note(names: Sequence[str]) -> str:
     """Say which records were left out."""
     return f"; left out, for their force is cut off at the end of its range: {', '.join(names)}" if names else ""
+
+
+def without_drift(rig: Rig, records: Sequence[Record]) -> tuple[list[Record], float]:
+    """Return the records without the drift of the force that the preflight found, and the largest drift [N].
+
+    A zero of the load cell that moves is the test's own. Where it was right, before the test or within it, is unknown:
+    a mean force that is no larger than the drift goes with it, and no preload is made of it; a larger one stays.
+
+    Equation: F - D (t - t_m) / (t_e - t_s), t_m the middle of the cycles from t_s to t_e; less their mean m where
+    |m| <= |D|
+
+    Parameters
+    ----------
+    rig : whose entries hold the findings
+    records : of one setting
+    """
+    changes = {
+        entry.name: found.size
+        for entry in rig.entries
+        for found in entry.findings
+        if found.check == "drift" and found.where.startswith("force")
+    }
+
+    def levelled(record: Record) -> Record:
+        run = cycles_of(record) if record.name in changes else None
+        if run is None:
+            return record
+        change = changes[record.name]
+        force = record.force - change * (record.time - 0.5 * (run.start + run.end)) / (run.end - run.start)
+        mean = float(run.mean(record.time, force).mean())
+        return replace(record, force=force - mean if abs(mean) <= abs(change) else force)
+
+    drifts = [abs(changes[record.name]) for record in records if record.name in changes]
+    return [levelled(record) for record in records], max(drifts, default=0.0)
+
+
+def drift_note(largest: float) -> str:
+    """Say by how much the force drifts [N], and what is not known for it; nothing without a drift."""
+    known = "; the zero of the force drifts by up to {:.2g} N: that is taken out, and a preload is known no better"
+    return known.format(largest) if largest else ""
 
 
 # --- Split into samples that are fitted, that choose, and that are held out

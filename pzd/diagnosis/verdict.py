@@ -1,7 +1,7 @@
 """The verdict on a damper: `named`, `ambiguous`, `none` or `unexplained`, its reason, and how sure it is.
 
-`conclude` adopts what predicts held-out tests, decides, and looks for more effects where the gap has no name. Two cases
-have a verdict without a search: `insufficient_data` and the knee law (`knee_verdict`).
+`conclude` adopts what predicts held-out tests, decides, and looks for more effects where the gap has no name. Three
+cases have a verdict without a search: `insufficient_data`, no test that slips, and the knee law (`knee_verdict`).
 """
 
 from __future__ import annotations
@@ -423,6 +423,27 @@ def insufficient_data_diagnosis(recorded: Sequence[PreparedRecord], envelope: Op
         ),
         gap=None,
         next_test=repeated_longest_test(recorded, envelope),
+    )
+
+
+def no_slip_diagnosis(rows: Sequence[ParameterRow]) -> Diagnosis:
+    """Return the diagnosis of tests none of which slips: the oil spring is all that they show.
+
+    Where it stands at the start of a record is an unknown of the record, and no preload.
+
+    Parameters
+    ----------
+    rows : of the setting, as identified
+    """
+    force = max(row.T0_N_low95 or 0.0 for row in rows)
+    return Diagnosis.without_effects(
+        verdict="ambiguous",
+        reason=(
+            "no test slips: the force only strains the oil spring, so that the tests show k and nothing of what flows, "
+            f"and any effect may be there; friction is above {force:.3g} N: record tests of a longer stroke, several "
+            "times that over which the force still grows after a reversal"
+        ),
+        gap=None,
     )
 
 

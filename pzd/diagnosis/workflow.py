@@ -46,6 +46,7 @@ from pzd.diagnosis.verdict import (
     insufficient_data_diagnosis,
     knee_verdict,
     no_prediction_note,
+    no_slip_diagnosis,
 )
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
@@ -74,6 +75,7 @@ def diagnose_setting(
     if identified.knees.law_of(setting) == "knee":
         return knee_verdict(identified, setting, diagnose)
     records, saturated = data.unsaturated_records(rig, setting)
+    records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
     prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
@@ -81,6 +83,8 @@ def diagnose_setting(
     baseline = base_of(identified.rows, setting)
     campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
+    if all(row.shows_oil_spring_alone for row in rows):
+        return Diagnosed(no_slip_diagnosis(rows), baseline, baseline, rows)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
@@ -91,7 +95,12 @@ def diagnose_setting(
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
-    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), data.saturation_note(saturated)
+    limits = (
+        hold_out_note(roles.hold_out),
+        no_prediction_note(prediction),
+        data.saturation_note(saturated),
+        data.drift_note(drift),
+    )
     final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,

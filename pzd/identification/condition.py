@@ -20,7 +20,7 @@ from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
 from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare, split_by_record
-from pzd.identification.stiffness import settle_stiffness
+from pzd.identification.stiffness import OilSpring, oil_spring_alone, settle_stiffness
 from pzd.identification.trust import ParameterEvidence
 from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
@@ -43,7 +43,10 @@ def identify_condition(
     seed : of the evolutionary search
     """
     records = [test for record in condition.records for test in separate_tests(record)]
-    objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
+    whole = Objective(tuple(prepare(r) for r in one_at_a_time(records)))
+    if spring := oil_spring_alone(records, whole, config.nuisance):
+        return _oil_spring_row(condition.labels, spring, whole.measured), None
+    objective, fit, auxiliary = fit_with_auxiliary(records, config, seed, whole)
     fit, stiffest = settle_stiffness(records, objective, fit, config.nuisance)
     by_record = objective.fitted_by_record(fit.parameters)
     fitted = fitted_records(records, objective.prepared, by_record, config.nuisance)
@@ -52,7 +55,7 @@ def identify_condition(
 
 
 def fit_with_auxiliary(
-    records: Sequence[Record], config: IdentifyConfig, seed: int
+    records: Sequence[Record], config: IdentifyConfig, seed: int, whole: Objective | None = None
 ) -> tuple[Objective, Fit, Auxiliary | None]:
     """Fit the element, and where the records show forces beside it, fit it again to the remainder.
 
@@ -61,12 +64,13 @@ def fit_with_auxiliary(
     records : of one condition
     config : the method, and standard deviations of what differs from test to test
     seed : of the evolutionary search
+    whole : their data, where these are prepared
 
     Returns
     -------
     the data as fitted, the optimum, and the forces beside the element; None where there are none
     """
-    whole = Objective(tuple(prepare(r) for r in one_at_a_time(records)))
+    whole = whole or Objective(tuple(prepare(r) for r in one_at_a_time(records)))
     element_alone = _optimum(whole, config, seed)
     if not auxiliary_is_visible(whole, element_alone):
         return whole, element_alone, None
@@ -160,6 +164,31 @@ def parameter_row(
         cells["k_N_per_m_low95"] = stiffest
     cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}
     return ParameterRow.model_validate(cells)
+
+
+def _oil_spring_row(labels: Labels, spring: OilSpring, measured: Array) -> ParameterRow:
+    """Return the row of tests in which nothing slips: k, and the least T0 there is.
+
+    Parameters
+    ----------
+    labels : setting, voltage, temperature
+    spring : the oil spring
+    measured : (N,) force of its tests [N]
+    """
+    compliance = 1.0 / spring.stiffness
+    noise = uncertainty([(r.slopes, r.residuals) for r in spring.records]).half_widths()
+    widths = half_widths(spring.records, spring.misfit)
+    slopes, residuals = (np.concatenate([getattr(r, n) for r in spring.records]) for n in ("slopes", "residuals"))
+    shown = rms(slopes[:, 2]) * compliance / rms(measured)
+    no_slip = f"no test slips: T0 is above {spring.friction:.3g} N, and only a longer stroke shows more"
+    evidence = [
+        ParameterEvidence("T0", 0.0, float(noise[0]), float(widths[0]), 0.0, no_slip),
+        ParameterEvidence("C", 0.0, float(noise[1]), float(widths[1]), 0.0, no_slip),
+        ParameterEvidence("k", compliance, float(noise[2]), float(widths[2]), shown),
+    ]
+    found = Bingham(spring.friction, 0.0, spring.stiffness)
+    row = parameter_row(labels, found, widths, evidence, (measured, residuals))
+    return row.model_copy(update={"T0_N_low95": spring.friction})
 
 
 def _auxiliary_row(labels: Labels, found: Auxiliary) -> AuxiliaryRow:

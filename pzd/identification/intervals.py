@@ -233,6 +233,8 @@ def _hidden_law_variance(records: Sequence[FittedRecord], slopes: Sequence[Array
         squares += [float(np.sum((each / peak) ** 2)) for each in (whole - s @ taken, whole)]
         samples += whole.size
     rms_left, rms_whole = np.sqrt(squares / samples).tolist()
+    if rms_whole == 0.0:  # nothing flows, by no law
+        return np.zeros(bread.shape[0])
     size = min(HIDDEN_FORCE / max(rms_left, 1e-12 * rms_whole), HIDDEN_FORCE_LIMIT / rms_whole)
     return np.asarray((taken * size) ** 2)
 

@@ -1,5 +1,7 @@
 """Whether the tests show the oil spring: the rigid damper beside the elastic one, and how stiff it is at least.
 
+Where no test slips they show it alone (`oil_spring_alone`).
+
 A stiff oil spring shows for an instant after each reversal alone, so that neither the curvature of the criterion at
 1/k = 0 nor at its optimum says how far 1/k may go. Models are compared as wholes instead: what one would change of the
 other is a column beside the slopes, and noise, sensors and the parameters that follow say how well its amplitude is
@@ -9,15 +11,17 @@ known.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from pzd.fit.element_coordinates import HARDLY_ELASTIC
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_rigid
 from pzd.identification.intervals import half_widths
-from pzd.identification.prepared_record import fitted_records, split_by_record
-from pzd.identification.trust import EXACT_FIT, Misfit
-from pzd.record import Record
+from pzd.identification.prepared_record import FittedRecord, fitted_records, split_by_record
+from pzd.identification.trust import EXACT_FIT, LARGEST_RESIDUAL, Misfit, misfit_of
+from pzd.record import Array, Record
+from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig
 
 MUCH_WORSE = 2.0
@@ -81,3 +85,51 @@ def _rejected(records: Sequence[Record], objective: Objective, best: Fit, other:
     by_record = split_by_record(objective.prepared, residuals, columns)
     fitted = fitted_records(records, objective.prepared, by_record, nuisance)
     return bool(abs(1.0 - amplitude) > half_widths(fitted, Misfit(0.0, 0.0))[2])
+
+
+# --- Tests in which nothing slips
+
+
+@dataclass(frozen=True, eq=False)
+class OilSpring:
+    """The oil spring, where no test slips: all that such tests show."""
+
+    stiffness: float
+    """k [N/m]."""
+    friction: float
+    """Least T0 [N]: half of the largest range that the force of the spring ran through without a slip."""
+    records: tuple[FittedRecord, ...]
+    """The tests with residuals (m,) and slopes (m, 3) by T0, C and 1/k, the first two zero."""
+    misfit: Misfit
+
+
+def oil_spring_alone(records: Sequence[Record], objective: Objective, nuisance: NuisanceConfig) -> OilSpring | None:
+    """Fit the oil spring alone; None where a test shows more of the damper than that.
+
+    Where the spring stands at the start of a record is unknown, and nothing slips that would forget it: each record has
+    a mean force of its own, which is neither a preload nor a friction.
+
+    Equation: F_i = m_i + k x, by least squares; T0 >= k X / 2 for the largest range X of a test
+                                                            Source: eq. (1) with dy/dt = 0
+
+    Parameters
+    ----------
+    records : of one condition
+    objective : their data
+    nuisance : standard deviations of what differs from test to test
+    """
+    pairs = [(t.at_samples(t.displacement)[t.counted], t.force[t.counted]) for t in objective.prepared]
+    moved = [x - x.mean() for x, _ in pairs]
+    forces = [force - force.mean() for _, force in pairs]
+    x, force = np.concatenate(moved), np.concatenate(forces)
+    stiffness = float(x @ force) / float(x @ x)
+    if stiffness <= 0.0 or rms(force - stiffness * x) > LARGEST_RESIDUAL * rms(force):
+        return None
+    by_record: list[tuple[Array, Array]] = [
+        (own - stiffness * each, np.outer(each, [0.0, 0.0, -(stiffness**2)]))
+        for each, own in zip(moved, forces, strict=True)
+    ]
+    fitted = fitted_records(records, objective.prepared, by_record, nuisance)
+    misfit = misfit_of(fitted)
+    friction = 0.5 * stiffness * max(float(np.ptp(each)) for each in moved)
+    return None if misfit.is_large else OilSpring(stiffness, friction, fitted, misfit)

@@ -119,8 +119,8 @@ def problem_of(records: Iterable[Record]) -> Problem:
     return evidence_of(campaign_of(records), damper_of((0.0,))).whole
 
 
-def diagnosed(records: Iterable[Record], jobs: int = 1, **config: object) -> Diagnosed:
-    """The diagnosis of records of one setting; `config` is its block."""
-    rig = Rig(tuple(records), ())
+def diagnosed(records: Rig | Iterable[Record], jobs: int = 1, **config: object) -> Diagnosed:
+    """The diagnosis of records of one setting, alone or with what the preflight found; `config` is its block."""
+    rig = records if isinstance(records, Rig) else Rig(tuple(records), ())
     settings = DiagnoseConfig.model_validate(config)
     return diagnose(settings, IdentifyConfig(), STAND, rig, identify(IdentifyConfig(), rig, 1), Control(), None, jobs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +16,10 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import saturation_note, unsaturated_records
 from pzd.record import Record
+from pzd.rig.config import Limits
+from pzd.rig.preflight import PreflightRecord, examined
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
 
 TRUTHS = {
     "orifice_quadratic": {"q": 2500.0},
@@ -207,3 +212,31 @@ def test_records_whose_force_is_cut_off_are_left_out_and_named(rng: np.random.Ge
     assert records[0].name in saturation_note(left_out)
     every = tuple(e.model_copy(update={"findings": (cut,)}) for e in entries)
     assert unsaturated_records(Rig(records, every), None) == (list(records), ())
+
+
+DRIFT = 60.0
+"""Change of the zero of the load cell over a test [N]; about a tenth of the force."""
+
+
+def with_drift(records: tuple[Record, ...]) -> Rig:
+    """Records whose force drifts away from what it was at first, and what the preflight says of them."""
+    drifting = [replace(r, force=r.force + DRIFT * (r.time - r.time[0]) / np.ptp(r.time)) for r in records]
+    return examined([partial(as_measured, r) for r in drifting], 1)
+
+
+def as_measured(record: Record) -> PreflightRecord:
+    run = cycles(record.time, record.displacement)
+    return PreflightRecord(record, run, kinematics(record.time, record.displacement, run), Limits())
+
+
+@pytest.mark.parametrize(("preload", "names"), [(0.0, ()), (200.0, ("preload_offset",))])
+def test_a_zero_that_drifts_is_no_preload(preload: float, names: tuple[str, ...], rng: np.random.Generator) -> None:
+    """Its mean, half of what it drifts by, is the tests' own; a preload beyond the drift is the damper's."""
+    effects = {"preload_offset": {"F_0": preload}} if preload else {}
+    rig = with_drift(sines(damper_of((0.0,), **effects), rng, (0.0,), cycles=6))
+    found = diagnosed(rig).diagnosis
+    assert found.effects == names, found.reason
+    assert found.verdict == ("named" if names else "none")
+    assert "the zero of the force drifts by up to" in found.reason
+    for name in names:
+        assert abs(found.parameters[name]["F_0"].value - preload) <= 0.5 * DRIFT + 5.0

@@ -248,6 +248,23 @@ def test_two_tests_a_voltage_show_no_trend(rng: np.random.Generator) -> None:
     assert trend(tuple(records)) is None
 
 
+# --- Tests none of which slips
+
+
+def test_where_no_test_slips_k_is_told_and_no_effect(rng: np.random.Generator) -> None:
+    """F = 150 N + 2e5 x + noise of 1 N: where the oil spring stood at the start is unknown, and no preload."""
+    sticking = Damper(base=(BaseRow(T0_N=1e4, C_Ns_per_m=1000.0, k_N_per_m=2e5),))
+    tests = [sine(sticking, 0.0, f, 5e-4, rng, noise=0.0) for f in (1.0, 1.5, 2.0)]
+    tests = [replace(r, force=r.force - r.force[0] + 150.0 + rng.standard_normal(r.time.size)) for r in tests]
+    found = diagnosed(tests)
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("ambiguous", ())
+    assert found.diagnosis.reason.startswith("no test slips")
+    assert found.damper == found.baseline
+    (row,) = found.parameters
+    assert row.k_N_per_m == pytest.approx(2e5, rel=2e-3)
+    assert row.T0_N is row.C_Ns_per_m is None
+
+
 # --- Records too short for a verdict
 
 

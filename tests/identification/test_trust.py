@@ -39,6 +39,34 @@ def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
     assert "undetermined: T0, C" in row.status
 
 
+def springs_under(rng: np.random.Generator, friction: float = 0.0, starts: tuple[float, ...] = (150.0, -40.0)) -> list:
+    """F = 2e5 x + F_i + friction sign(v), sines of 0.5 mm, 1 N of noise."""
+    tests = [sine_test(Bingham(5e3, 0.0, 2e5), f, 5e-4) for f in (1.0, 2.0)]
+    return [
+        replace(
+            r,
+            force=2e5 * r.displacement + start + friction * np.sign(r.velocity) + rng.standard_normal(r.time.size),
+        )
+        for r, start in zip(tests, starts, strict=True)
+    ]
+
+
+def test_where_no_test_slips_the_oil_spring_is_told_and_a_bound_of_friction(rng: np.random.Generator) -> None:
+    """Each test began at a force of its own, 150 N and -40 N: neither is a preload."""
+    row = row_for(*springs_under(rng))
+    assert row.shows_oil_spring_alone
+    assert row.k_N_per_m_low95 < 2e5 < row.k_N_per_m_high95
+    assert row.k_N_per_m == pytest.approx(2e5, rel=2e-3)
+    assert row.T0_N_low95 == pytest.approx(100.0, rel=5e-3)  # half of k times the range of 1 mm
+    assert (row.T0_N, row.T0_N_high95, row.C_Ns_per_m, row.C_Ns_per_m_low95) == (None,) * 4
+    assert row.status.startswith("undetermined: T0, C (no test slips")
+
+
+def test_friction_beside_a_spring_that_carries_most_is_no_damper_that_never_slips(rng: np.random.Generator) -> None:
+    """3 N of friction in 250 N, under 1 N of noise: a loop of 3 % of the whole, which repeats."""
+    assert not row_for(*springs_under(rng, friction=3.0)).shows_oil_spring_alone
+
+
 def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips() -> None:
     record = sine_test(Bingham(50.0, 1000.0, 4e5), 2.0, 0.01)
     tared = Objective((prepare(replace(record, force=record.force + 600.0)),))

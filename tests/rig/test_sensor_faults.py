@@ -190,6 +190,21 @@ def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rn
     assert told >= 0.85 * DRAWS
 
 
+@pytest.mark.parametrize("told_at", [5, 8])
+def test_a_drift_is_told_of_few_cycles_as_well_and_noise_alone_is_none(told_at: int, rng: np.random.Generator) -> None:
+    """A line of 30 N in 300 N, noise of 3 N, in sines of so many cycles."""
+    time = np.arange(told_at * 250 + 125) / 250.0
+    x = 0.02 * np.sin(2.0 * np.pi * time)
+    found = []
+    for one in rng.spawn(30):
+        force = element_force(x, 0.004, 200.0, 800.0, 3e5) + 3.0 * one.standard_normal(time.size)
+        for change in (0.0, 30.0):
+            record = Record("r", None, time, x, x, x, force + change * time / time[-1], None)
+            found.append((change > 0.0, bool(sizes([record], drift))))
+    assert all(told for drifts, told in found if drifts)
+    assert not any(told for drifts, told in found if not drifts)
+
+
 def test_a_zero_that_drifts_is_told_with_its_change(rng: np.random.Generator) -> None:
     shares = []
     for one in rng.spawn(DRAWS):

@@ -187,6 +187,12 @@ LEAST_DRIFT = 0.02
 """Least drift of the zero over the record that is reported, as a share of half the range of the force."""
 CLEAR = 6.0
 """Standard errors of a step or drift, from the scatter of the cycles about it."""
+DRIFT_CYCLES = 4
+"""Cycles from which a drift is told: two values of the line, and one of the scatter behind the first cycle."""
+DRIFT_CHANCE = 0.01
+"""Chance of a drift of so many standard errors where there is none, by Student's t: of five cycles ten, of four 64.
+
+Reason: of six cycles it is the six of `CLEAR`."""
 BETTER = 4.0
 """A step is one where a steady change leaves this many times as much of the squares."""
 
@@ -230,17 +236,21 @@ def drift(test: PreflightRecord) -> Iterator[Finding]:
 
     Equation: mean of a cycle = a + b n                              Source: least squares
     """
+    from scipy.special import stdtrit
+
     run = test.cycles
-    if run is None or run.count < CYCLES:
+    if run is None or run.count < DRIFT_CYCLES:
         return
     folded = run.fold(test.record.time, test.record.force)[1:]
     means, order = folded.mean(axis=1), np.arange(run.count - 1, dtype=np.float64)
     (slope, _), residual, *_ = np.polyfit(order, means, 1, full=True)
-    scatter = np.sqrt(float(residual[0]) / max(run.count - 3, 1)) if residual.size else 0.0
+    free = run.count - 3
+    scatter = np.sqrt(float(residual[0]) / free) if residual.size else 0.0
+    clear = max(CLEAR, float(stdtrit(free, 1.0 - 0.5 * DRIFT_CHANCE)))
     error = scatter / np.sqrt(np.sum((order - order.mean()) ** 2))
     change = float(slope) * run.count
     half = 0.5 * float(np.ptp(np.percentile(test.record.force, (1.0, 99.0))))
-    if abs(change) > LEAST_DRIFT * half and abs(slope) > CLEAR * error:
+    if abs(change) > LEAST_DRIFT * half and abs(slope) > clear * error:
         yield Finding(
             check="drift",
             where=f"force, mean of a cycle, over {counted(run.count, 'cycle')}",
