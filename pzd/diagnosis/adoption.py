@@ -81,7 +81,7 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
         between = validation.interpolation_error(kept.fitted.damper, by_criterion=by_criterion)
         removable = [name for name in kept.adopted if name not in forced]
         compared, kind = (error, baseline), "kept-back ones"
-        worse = validation.worse_at(*compared)
+        worse = validation.worse_in_shape_at(*compared)
         if not worse:
             compared, kind = (between, reference), "those of a voltage left out"
             worse = validation.interpolates_worse_at(between)
@@ -163,7 +163,7 @@ def _harmful_effect(
         return None
     error_of = validation.error_by_criterion if by_criterion else validation.held_out_error
     without = ((name, error_of(_without_effect(selection, name).fitted.damper)) for name in reversed(removable))
-    return next((name for name, other in without if validation.worse_at(error, other)), None)
+    return next((name for name, other in without if validation.worse_in_shape_at(error, other)), None)
 
 
 def _without_effect(selection: Selection, effect: str, reason: str = WORSENS_PREDICTION) -> Selection:

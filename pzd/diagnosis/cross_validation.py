@@ -34,7 +34,7 @@ from pzd.fit.cross_validation import (
     squared_sums,
 )
 from pzd.record import Array, Mask
-from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns, nuisance_forces
 
 # --- Folds: each test is held out once
 
@@ -235,6 +235,14 @@ class CrossValidation(Folds):
         found = self._voltages_where(predicts_worse, one, other)
         return found or (self.voltages if other.visibly_below(one) else ())
 
+    def worse_in_shape_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
+        """Return the voltages [V] at which one damper predicts worse, and the shape of the force as well.
+
+        The gain of a test that no fit has seen is nobody's to know: at one per cent it outweighs what a small effect
+        closes, and the true damper predicts worse by the chance of it.
+        """
+        return self.worse_at(one, other) if self.worse_at(one.shapes, other.shapes) else ()
+
     def better_at(self, one: PredictionError, other: PredictionError) -> tuple[float | None, ...]:
         """Return the voltages [V] at which one damper predicts better; all where only the whole shows it."""
         return self._voltages_where(predicts_better, one, other)
@@ -359,8 +367,21 @@ class CrossValidation(Folds):
             if i in self._lone_tests:
                 negligible += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
-            entries.append((*squared_sums(force, residual), negligible))
+            entries.append((*squared_sums(force, residual), negligible, self._beyond_own(p, residual, kept)))
         return PredictionError.of_entries(records, entries)
+
+    def _beyond_own(self, p: PreparedRecord, residual: Array, kept: Mask) -> float:
+        """Compute the squares of a residual beyond what offset, gain and delay of its test explain [N^2]."""
+        rest = float(residual @ residual)
+        if not np.isfinite(rest) or rest == 0.0:
+            return rest
+        everywhere, no_timing = np.ones(residual.size, dtype=np.bool_), np.zeros((residual.size, 0))
+        variance, predicted = rest / residual.size, p.record.force[kept] - residual
+        size, timing = nuisance_forces(
+            residual, predicted, p.record.rate, variance, self.campaign.nuisance, no_timing, everywhere, kept
+        )
+        beyond = residual - size - timing
+        return float(beyond @ beyond)
 
     def _refit_by_likelihood(self, damper: Damper) -> _Refit:
         problem = evidence_of(self.campaign, damper).whole

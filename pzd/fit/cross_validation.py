@@ -8,7 +8,7 @@ Source: Stone 1974, J. R. Stat. Soc. B 36, 111-147
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,18 +84,29 @@ class PredictionError:
     negligible: Array
     """(t,) error that does not count [N^2]: a residual of the visible size at every sample, and where the other half
     of the test was fitted also what offset, gain and delay of the test may contribute."""
+    beyond_own: Array | None = None
+    """(t,) error beyond what each test's own offset, gain and delay explain [N^2]; None where it is not asked for."""
 
     @classmethod
     def of_entries(cls, records: Sequence[int], entries: Sequence[tuple[float, ...]]) -> PredictionError:
-        """Collect entries (error, energy, spread, negligible) of some records."""
-        return cls(tuple(records), *np.array(entries, dtype=np.float64).reshape(-1, 4).T)
+        """Collect entries (error, energy, spread, negligible), or with what is beyond their own, of some records."""
+        columns = np.array(entries, dtype=np.float64).T if entries else np.zeros((4, 0))
+        return cls(tuple(records), *columns)
 
     @classmethod
     def concatenated(cls, parts: Sequence[PredictionError]) -> PredictionError:
         """Join the entries of several folds."""
         names = ("error", "energy", "spread", "negligible")
         sums = (np.concatenate([np.zeros(0), *(getattr(p, name) for p in parts)]) for name in names)
-        return cls(tuple(i for part in parts for i in part.records), *sums)
+        beyond = [p.beyond_own for p in parts if p.records]
+        known = [each for each in beyond if each is not None]
+        whole = np.concatenate(known) if known and len(known) == len(beyond) else None
+        return replace(cls(tuple(i for part in parts for i in part.records), *sums), beyond_own=whole)
+
+    @property
+    def shapes(self) -> PredictionError:
+        """The same of shapes alone: what each test has of its own, and no damper can know, taken out."""
+        return self if self.beyond_own is None else replace(self, error=self.beyond_own)
 
     @property
     def criterion(self) -> float | None:
@@ -121,7 +132,9 @@ class PredictionError:
         """Select the entries of some records."""
         kept = np.isin(self.records, wanted)
         records = tuple(r for r, k in zip(self.records, kept, strict=True) if k)
-        return PredictionError(records, self.error[kept], self.energy[kept], self.spread[kept], self.negligible[kept])
+        beyond = None if self.beyond_own is None else self.beyond_own[kept]
+        columns = self.error[kept], self.energy[kept], self.spread[kept], self.negligible[kept]
+        return PredictionError(records, *columns, beyond)
 
 
 def squared_sums(force: Array, residual: Array) -> tuple[float, float, float]:

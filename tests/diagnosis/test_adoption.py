@@ -68,7 +68,7 @@ class FixedPredictions:
     def error_by_criterion(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
-    def worse_at(self, one: float, other: float) -> tuple[float | None, ...]:
+    def worse_in_shape_at(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
 

@@ -181,6 +181,20 @@ def test_chance_alone_predicts_better_rarely_for_any_number_of_tests(tests: int,
     assert found < 1.5 * 4000 * 0.02275
 
 
+def test_a_gain_of_a_test_that_no_fit_has_seen_speaks_against_no_damper(rng: np.random.Generator) -> None:
+    """The true damper predicts tests of gains within their prior as they are, and the shape of their force exactly."""
+    truth = damper_of(TWO)
+    records = sines(truth, rng, TWO, cycles=2)
+    scaled = [replace(record, force=record.force * (1.015 if i % 2 else 0.985)) for i, record in enumerate(records)]
+    alike, asked = validation(records, truth), validation(tuple(scaled), truth)
+    before, error = alike.held_out_error(truth), asked.held_out_error(truth)
+    assert error.error.sum() > 1.3 * before.error.sum()
+    np.testing.assert_allclose(error.shapes.error.sum(), before.shapes.error.sum(), rtol=0.05)
+    lucky, unlucky = replace(error, error=0.9 * error.error), replace(error, error=1.1 * error.error + 1e3)
+    assert asked.worse_at(unlucky, lucky)
+    assert not asked.worse_in_shape_at(unlucky, lucky)
+
+
 def test_an_invisible_increase_of_the_error_is_not_worse(rng: np.random.Generator) -> None:
     asked = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
     plain = PredictionError(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-2)))
