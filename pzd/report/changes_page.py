@@ -31,8 +31,8 @@ from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render
 
-SHOWN = 4
-"""Motions that are drawn: those with the largest difference."""
+SHOWN = 3
+"""Motions that are drawn, those with the largest difference: a row of loops, and below each what changes in it."""
 _FOOTER = "Written by pzd changes. Every number of this page stands in the JSON beside it, or in the records."
 _HEADLINES = {
     "changed": "Something changed",
@@ -165,7 +165,7 @@ def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...
         change = None if start is None or to is None else to - start
         relative = None if change is None or not start else change / abs(start)
         at = amount(each.at_voltage_V[i], control.unit) if each.at_voltage_V is not None else DASH
-        interval = f"{number(low, 4)} to {number(high, 4)}"
+        interval = DASH if low is None or high is None else f"{number(low, 4)} to {number(high, 4)}"
         yield (
             name, at, amount(start, each.unit, 4), amount(to, each.unit, 4), interval, amount(change, each.unit),
             percent(relative), share,

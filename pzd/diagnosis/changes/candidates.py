@@ -268,7 +268,7 @@ def _of_stand(name: str, force: float) -> Candidate:
 
 def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Candidate]:
     groups = rows_per_voltage(first.damper.base)
-    compared = sorted({_nearest(groups, c.voltage) for c in comparisons})
+    compared = sorted({nearest_node(groups, c.voltage) for c in comparisons})
     found = []
     for name, unit in ELEMENT_UNITS.items():
         low, high = (-np.inf, np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
@@ -281,7 +281,8 @@ def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Ca
     return found
 
 
-def _nearest(groups: Sequence[tuple[float, list[BaseRow]]], voltage: float | None) -> int:
+def nearest_node(groups: Sequence[tuple[float, list[BaseRow]]], voltage: float | None) -> int:
+    """Return the index of the voltage of a base that is nearest to a control signal [V]."""
     return min(range(len(groups)), key=lambda i: abs(groups[i][0] - (voltage or 0.0)))
 
 

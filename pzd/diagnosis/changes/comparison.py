@@ -22,6 +22,7 @@ from pzd.diagnosis.changes.candidates import (
     candidates,
     element_of,
     known_parameter,
+    nearest_node,
     parameter_value,
     values_by_control,
 )
@@ -33,6 +34,7 @@ from pzd.diagnosis.changes.pairs import (
     course,
     cycles_compared,
     model_compared,
+    motion_away,
     nearest_motion,
     octave_mean,
     paired,
@@ -189,7 +191,8 @@ def comparisons_of(
     """Pair the tests, and compare the others of the second state with the damper of the first.
 
     What that damper misses of the nearest motion of the first state is taken to be missed here too, where that
-    predicts the tests of the first state from one another better than the damper alone predicts its own.
+    predicts the tests of the first state from one another better than the damper alone predicts its own; the nearer
+    that motion, the less is missed.
 
     Parameters
     ----------
@@ -219,13 +222,12 @@ def comparisons_of(
     beside = [test for test in rest if _as_tested(before, test, identify)]
     if not beside and not found:
         beside = [test for test in rest if _in_range(before, test)]
-    carried = _carried(before.damper, one, within, nuisance) if beside else Missed.unknown()
-    if BEYOND_TESTED * own.share <= carried.share:
-        carried = Missed.unknown()
+    carried = _carried(before.damper, one, within, nuisance) if beside else None
     for test in beside:
         partner = nearest_motion(test, one, within)
-        if partner is not None and carried.share < np.inf:
-            found.append(carried.beside(replace(cycles_compared(before.damper, partner, test), before=None)))
+        farther = np.inf if carried is None or partner is None else _farther(motion_away(partner, test), carried)
+        if carried is not None and partner is not None and farther * carried.share < BEYOND_TESTED * own.share:
+            found.append(carried.beside(replace(cycles_compared(before.damper, partner, test), before=None), farther))
         else:
             through = model_compared(before.damper, test, mean, _temperature(before, test))
             found.append(own.beside(through, BEYOND_TESTED))
@@ -278,14 +280,11 @@ class Missed:
     """Of the force (r.m.s.)."""
     power: Array
     """(H + 1,) mean square at every harmonic, as a share of the squared peak force, over the octave about it."""
+    away: float = 0.0
+    """Mean distance of the motions from which a test is carried over (`motion_away`); 0 of the damper alone."""
 
     @classmethod
-    def unknown(cls) -> Missed:
-        """Return what is missed where there are no tests that tell."""
-        return cls(np.inf, np.zeros(1))
-
-    @classmethod
-    def of(cls, comparisons: Sequence[Comparison], nuisance: NuisanceConfig) -> Missed:
+    def of(cls, comparisons: Sequence[Comparison], nuisance: NuisanceConfig, away: float = 0.0) -> Missed:
         """Return what is left of differences beyond noise and what tests differ by themselves."""
         likelihood = Likelihood(tuple(comparisons), nuisance, 0.0)
         residuals = [c.difference for c in comparisons]
@@ -294,13 +293,15 @@ class Missed:
         for c, r, own, power in zip(
             comparisons, residuals, likelihood.own_of_tests(residuals, scatter), powers, strict=True
         ):
-            missed += max(float((r - own) @ (r - own) - np.sum(c.variance)), 0.0) / c.peak**2
+            missed += (float((r - own) @ (r - own)) - float(np.sum(c.variance))) / c.peak**2
             force += float(np.sum(stacked(c.reference) ** 2)) / c.peak**2
-            power[: c.rate.size] = np.abs(unstacked(r - own)) ** 2 / c.peak**2
+            power[: c.rate.size] = (np.abs(unstacked(r - own)) ** 2 - c.variance[: c.rate.size]) / c.peak**2
         known = np.nan_to_num(np.nanmean(powers[:, : max(c.rate.size for c in comparisons)], axis=0))
         octaves = octave_mean(known)
         octaves[0] = known[0]
-        return cls(float(np.sqrt(missed / force)) if force > 0.0 else 0.0, octaves)
+        # Of squares less those of noise some are below 0 by chance, as others are above: only their mean is held to 0.
+        share = float(np.sqrt(max(missed, 0.0) / force)) if force > 0.0 else 0.0
+        return cls(share, np.maximum(octaves, 0.0), away)
 
     def beside(self, comparison: Comparison, times: float = 1.0) -> Comparison:
         """Return a comparison in which a model stands for a test, and misses so many times what it misses here."""
@@ -319,11 +320,26 @@ def _own_missed(state: State, nuisance: NuisanceConfig) -> Missed:
     return Missed.of(alone, nuisance) if alone else Missed(0.0, np.zeros(1))
 
 
-def _carried(damper: Damper, tests: Sequence[AveragedTest], voltage_within: float, nuisance: NuisanceConfig) -> Missed:
+def _carried(
+    damper: Damper, tests: Sequence[AveragedTest], voltage_within: float, nuisance: NuisanceConfig
+) -> Missed | None:
     """Return what is missed of the tests of a state if a model carries each over from the nearest other one."""
     partners = ((nearest_motion(test, tests, voltage_within), test) for test in tests)
-    found = [cycles_compared(damper, partner, test) for partner, test in partners if partner is not None]
-    return Missed.of(found, nuisance) if found else Missed.unknown()
+    pairs = [(partner, test) for partner, test in partners if partner is not None]
+    away = float(np.mean([motion_away(*pair) for pair in pairs])) if pairs else 0.0
+    if away == 0.0:
+        return None
+    return Missed.of([cycles_compared(damper, *pair) for pair in pairs], nuisance, away)
+
+
+def _farther(away: float, carried: Missed) -> float:
+    """Return how many times as much is missed of a test that is carried over so far.
+
+    Equation: sqrt(d / D), D the mean distance at which it was measured
+    Source: a linear variogram, Matheron 1963, Econ. Geol. 58, 1246: of laws with kinks what two motions differ by grows
+    so in the mean square, of smooth ones with the square of the distance, so that nearby it is not underrated
+    """
+    return float(np.sqrt(away / carried.away))
 
 
 # --- What is found
@@ -425,9 +441,12 @@ class Findings:
         return self.search.size_of(best, candidate) > self.search.left(best)
 
     def _next_test(self, best: Fitted, rivals: dict[str, list[Fitted]]) -> NextTest | None:
-        """Return the test that tells the first change with rivals from these, in place or on the damper."""
+        """Return the test that tells the first change with rivals from these, in place or on the damper.
+
+        Without any, where what the model misses hides what is left, a motion of the first state run again tells more.
+        """
         if not rivals:
-            return None
+            return self._motion_again() if self.search.hidden(best) > self.diagnose.visible else None
         name, fits = next(iter(rivals.items()))
         named = {", ".join(_added(f, best)): f for f in reversed(fits) if _added(f, best)}
         told = (name or "nothing", *reversed(named))
@@ -442,6 +461,20 @@ class Findings:
         voltages = [v for v in self._voltages() if v is not None]
         envelope = operating_envelope(Limits(), prepared, voltages)
         return separating_test(list(zip(told, dampers, strict=True)), envelope, self._temperatures()[0])
+
+    def _motion_again(self) -> NextTest | None:
+        """Return the test of the first state with the largest force, where no motion of it was run again."""
+        own = averaged(self.before.prepared)
+        if not own or any(c.before is not None for c in self.comparisons):
+            return None
+        test = max(own, key=lambda each: float(np.max(np.abs(each.prepared.folded))))
+        return NextTest(
+            waveform=f"the motion of {test.record.name} in {self.before.name}, run again",
+            frequency_Hz=test.frequency,
+            amplitude_m=2.0 * float(np.abs(test.displacement[1])),
+            voltage_V=test.voltage,
+            separates=("what changed", "what the model misses"),
+        )
 
     def _gas(self, best: Fitted) -> Fitted:
         """Put a gas force in the place of a load-cell zero beside a gas spring that changed as that of a gas does."""
@@ -601,7 +634,10 @@ class Findings:
     def _values(
         self, mine: Sequence[tuple[Coordinate, float, float]]
     ) -> tuple[tuple[float, ...] | None, Numbers, Numbers, Numbers, Numbers]:
-        """Return the voltages, and the value in the first state, in the second, and the ends of its interval."""
+        """Return the voltages, and the value in the first state, in the second, and the ends of its interval.
+
+        What no test shows, its error infinite, has neither a value in the second state nor an interval.
+        """
         c, x, e = mine[0]
         if c.name == "temperature":
             start, to = self._temperatures()
@@ -611,6 +647,13 @@ class Findings:
         if c.name in ELEMENT_COLUMNS:
             return self._element_values(mine)
         own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
+        if not np.isfinite(e):
+            at = (
+                cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
+                if isinstance(own, tuple)
+                else None
+            )
+            return at, own, None, None, None
         if isinstance(own, tuple):
             ends = np.sort([values_by_control(c, own, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0)], axis=0)
             at = cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
@@ -634,13 +677,17 @@ class Findings:
             return [float(element_of(damper, v, temperature)[column]) for v in voltages]
 
         start = at([0.0] * len(mine))
-        ends = [at([x + s * LEVEL * e for _, x, e in mine]) for s in (0.0, -1.0, 1.0)]
-        to = ends[0]
-        low = [min(a, b) for a, b in zip(ends[1], ends[2], strict=True)]
-        high = [max(a, b) for a, b in zip(ends[1], ends[2], strict=True)]
+        shown = [e if np.isfinite(e) else 0.0 for _, _, e in mine]
+        after, one, other = (
+            at([x + s * LEVEL * e for (_, x, _), e in zip(mine, shown, strict=True)]) for s in (0.0, -1.0, 1.0)
+        )
+        unseen = {c.node for c, _, e in mine if not np.isfinite(e)}
+        known = [None not in unseen and (v is None or nearest_node(groups, v) not in unseen) for v in voltages]
+        columns = (after, [*map(min, one, other)], [*map(max, one, other)])
+        to, low, high = (tuple(v if k else None for v, k in zip(column, known, strict=True)) for column in columns)
         if len(groups) < 2 or len(voltages) < 2:
             return None, start[0], to[0], low[0], high[0]
-        return tuple(cast("list[float]", voltages)), tuple(start), tuple(to), tuple(low), tuple(high)
+        return tuple(cast("list[float]", voltages)), tuple(start), to, low, high
 
     def _voltages(self) -> list[float | None]:
         """Return the control signals of the compared tests at which the first state has parameters."""
@@ -718,8 +765,10 @@ class Findings:
     ) -> str:
         of_damper = list(dict.fromkeys(c.name for c in listed if c.of == "damper"))
         of_stand = list(dict.fromkeys(c.name for c in listed if c.of == "stand"))
-        size = f"the force differs by {difference.rms_N:.3g} N r.m.s., {100.0 * difference.share_of_peak:.2g} % of peak"
-        told = [f"{size}, of which {difference.left_N:.2g} N are left, {difference.noise_N:.2g} N of them noise"]
+        size = f"the force differs by {_digits(difference.rms_N)} N r.m.s."
+        peak = f"{100.0 * difference.share_of_peak:.2g} % of peak"
+        left, noise = _digits(difference.left_N), _digits(difference.noise_N)
+        told = [f"{size}, {peak}, of which {left} N are left, {noise} N of them noise"]
         if of_damper:
             told.append(f"of the damper: {', '.join(of_damper)}")
         elif verdict == "unchanged":
@@ -765,6 +814,11 @@ class Findings:
                 )
             )
         return tuple(found)
+
+
+def _digits(value: float) -> str:
+    """Return a number to three digits, without a power of ten."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def _added(fitted: Fitted, best: Fitted) -> list[str]:

@@ -151,14 +151,18 @@ def motion_distance(before: AveragedTest, after: AveragedTest) -> float:
     return float(away / max(np.linalg.norm(one[1:]), np.linalg.norm(other[1:])))
 
 
+def motion_away(before: AveragedTest, after: AveragedTest) -> float:
+    """Return how far two motions lie apart: in frequency by the logarithm of its ratio, in displacement by its share.
+
+    Equation: sqrt(ln(f / f')^2 + d^2), d of `motion_distance`: of one waveform the share by which the amplitudes differ
+    """
+    return float(np.hypot(np.log(before.frequency / after.frequency), motion_distance(before, after)))
+
+
 def nearest_motion(test: AveragedTest, others: Sequence[AveragedTest], voltage_within: float) -> AveragedTest | None:
-    """Return the test of the same control signal whose frequency and amplitude are nearest in ratio; None without."""
-
-    def away(other: AveragedTest) -> float:
-        amplitude, own = (float(np.abs(t.displacement[1])) for t in (test, other))
-        return float(np.hypot(np.log(test.frequency / other.frequency), np.log(amplitude / own)))
-
-    return min((t for t in others if t is not test and _same_level(t, test, voltage_within)), key=away, default=None)
+    """Return the test of the same control signal whose motion is nearest; None without."""
+    alike = (t for t in others if t is not test and _same_level(t, test, voltage_within))
+    return min(alike, key=lambda other: motion_away(other, test), default=None)
 
 
 def paired(

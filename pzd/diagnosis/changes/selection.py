@@ -176,9 +176,17 @@ class Search:
         together = (*before.candidates, promise.candidate)
         return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
 
-    def _tried(self, before: Fitted, *, present: bool = False) -> list[Candidate]:
-        """Return the candidates that are asked beside some; those that the first state has too, where they are."""
-        asked = [c for c in self.candidates if self._flexible or not c.flexible or (present and not c.absent)]
+    def _tried(self, before: Fitted, *, in_place: bool = False) -> list[Candidate]:
+        """Return the candidates that are asked beside some; in the place of one, two kinds of flexible laws too.
+
+        Those that the first state has, and a new force beside the element: without memory it imitates nothing that the
+        element does, and it has to pay for its numbers.
+        """
+        asked = [
+            c
+            for c in self.candidates
+            if self._flexible or not c.flexible or (in_place and (not c.absent or known()[c.name].place == "parallel"))
+        ]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
     def _additions(self, before: Fitted, *, possible: bool = False) -> list[Fitted]:
@@ -241,7 +249,7 @@ class Search:
 
     def _as_good(self, fitted: Fitted, best: Fitted) -> bool:
         """Whether a fit leaves no more than the best one may leave in its direction."""
-        return self.left(fitted) <= max(AS_GOOD * self.left(best), self._hidden(best))
+        return self.left(fitted) <= max(AS_GOOD * self.left(best), self.hidden(best))
 
     def left(self, fitted: Fitted, scatter: Scatter | None = None) -> float:
         """Return what a fit leaves beyond noise and what tests differ by themselves (r.m.s., in units of the peaks).
@@ -301,10 +309,18 @@ class Search:
         return self._fit(kept, start, fitted.scatter)
 
     def _admissible(self, fitted: Fitted, least: float) -> bool:
-        """Whether the last change of a fit is physical and makes at least so much force."""
-        first = self.regression.response.first
-        natural = first.is_natural(fitted.coordinates, fitted.values.tolist())
-        return natural and self.size_of(fitted, fitted.candidates[-1]) >= least
+        """Whether the last change of a fit is physical, makes at least so much force, and each number of it shows.
+
+        A law of which a number does nothing is another law: a valve that is open from the yield on is a smaller C.
+        """
+        first, new = self.regression.response.first, fitted.candidates[-1]
+        if not first.is_natural(fitted.coordinates, fitted.values.tolist()) or self.size_of(fitted, new) < least:
+            return False
+        if len(new.coordinates) == 1:
+            return True
+        columns = self.regression.columns(fitted.coordinates, fitted.values)
+        shows = np.any([np.any(own != 0.0, axis=0) for own in columns], axis=0)
+        return all(s for s, c in zip(shows, fitted.coordinates, strict=True) if c in new.coordinates)
 
     def _over_tests(self, squares: Sequence[float]) -> float:
         """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
@@ -317,14 +333,14 @@ class Search:
 
     def _least(self, fitted: Fitted) -> float:
         """Return the r.m.s. force from which something counts, each test in units of its peak."""
-        return max(self.visible, self._hidden(fitted))
+        return max(self.visible, self.hidden(fitted))
 
     def _adoptable(self, fitted: Fitted) -> float:
         """Return the r.m.s. force from which a change is adopted, each test in units of its peak.
 
         What the model misses of others is seldom as much, nor what it misses of the tests that it stands for.
         """
-        return max(self.visible, LEVEL * self._missed_of_difference(fitted), self._hidden(fitted))
+        return max(self.visible, LEVEL * self._missed_of_difference(fitted), self.hidden(fitted))
 
     def _possible(self, fitted: Fitted) -> float:
         """Return the r.m.s. force from which a change is possible: what the model misses of others is usually less."""
@@ -342,7 +358,7 @@ class Search:
         squares = [float(d @ d) / peak**2 for d, peak in zip(within, self._peaks, strict=True)]
         return self.regression.likelihood.known_discrepancy * self._over_tests(squares)
 
-    def _hidden(self, fitted: Fitted) -> float:
+    def hidden(self, fitted: Fitted) -> float:
         """Return the r.m.s. force that the model misses of the difference, and of the tests that it stands for."""
         missed = [float(np.sum(self.regression.likelihood.missed_by_model(i))) for i, _ in enumerate(self._peaks)]
         through = self._over_tests([m / peak**2 for m, peak in zip(missed, self._peaks, strict=True)])
@@ -387,7 +403,7 @@ class Search:
     def rivals(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with another candidate in the place of one, where the criterion is nearly as low."""
         less = self.without(best, candidate)
-        tried = [c for c in self._tried(less, present=True) if c.name != candidate.name]
+        tried = [c for c in self._tried(less, in_place=True) if c.name != candidate.name]
         own = self._promising(less, [candidate], best.scatter)[0]
         limit = own.criterion + self.rival_bic + SLACK
         promising = self._promising(less, tried, best.scatter)
@@ -404,11 +420,12 @@ class Search:
 
         One with more numbers has to pay for them: else it is the same change told at greater length.
         """
-        if fitted.values.size > best.values.size:
+        new = fitted.candidates[-1]
+        if fitted.values.size > best.values.size or (new.flexible and new.absent):
             return fitted.bic <= best.bic
         if fitted.bic <= best.bic + self.rival_bic:
             return True
-        if self.left(fitted) <= self._hidden(best):
+        if self.left(fitted) <= self.hidden(best):
             return True
         if self.left(best) < AS_GOOD * self._least(best):
             return False

@@ -11,7 +11,8 @@ from states import SPEED, campaign, drawn_damper, found, likelihood_between, nam
 
 from pzd.artefacts.changes import Change
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.changes.regression import LEVEL, SHARE_SCATTER, USUAL_SHARE, Scatter
+from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
+from pzd.fit.intervals import LEVEL
 from pzd.record import Record
 from pzd.schema.errors import DataError
 

@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import FORCE, SPEED, STROKE, campaign, drawn_damper, names, names_told, state_of
+from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, names, names_told, state_of
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
-from pzd.diagnosis.changes.comparison import Findings, changes_between, findings_between
+from pzd.diagnosis.changes.comparison import Findings, Missed, changes_between, comparisons_of, findings_between
 from pzd.diagnosis.changes.selection import _scaled
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
+from pzd.record import Record
 
 
 def findings(rng: np.random.Generator, before: Damper, after: Damper, scatter: float = 0.002) -> Findings:
@@ -93,3 +94,60 @@ def test_a_part_that_no_verdict_names_is_asked_last_where_the_first_state_has_it
     assert all(c.flexible for c in asked if c.name == "second_branch")
     assert not any(c.flexible for c in asked if c.name in ("T0", "C", "k"))
     assert "second_branch" in names_told(found.changes())
+
+
+def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_number(rng: np.random.Generator) -> None:
+    """Open from the yield on, it is a smaller C: where it opens moves no force."""
+    damper = drawn_damper(rng, (0.0,))
+    halved = damper.model_copy(update={"base": (damper.base[0].model_copy(update={"C_Ns_per_m": 500.0}),)})
+    found = findings(rng, damper, halved)
+    search = found.search
+    (valve,) = [c for c in search.candidates if c.name == "relief_valve"]
+    opens, slope = valve.coordinates
+    start = np.array([opens.low, np.log(500.0 / slope.scale)])
+    fitted = search.regression.fit((valve,), start, found.best.scatter)
+    assert not search._admissible(fitted, 0.0)
+    assert found._values([(opens, opens.low, np.inf)])[2:] == (None, None, None)
+    assert names(found.changes()) == ["C"]
+
+
+def outside(damper: Damper, rng: np.random.Generator, motions: tuple[tuple[float, float], ...]) -> list[Record]:
+    """Tests of a damper with a law beside it that is not in the library, of a tenth of the peak."""
+    records = campaign(damper, rng, motions)
+    shape = [200.0 * np.sin(400.0 * r.displacement) * np.tanh(8.0 * r.velocity) for r in records]
+    return [replace(r, force=r.force + f) for r, f in zip(records, shape, strict=True)]
+
+
+def carried(draw: np.random.Generator, motions: tuple[tuple[float, float], ...]) -> list[float]:
+    """Mean square that is missed of the first harmonic of motions that were not run before, in squared peaks."""
+    damper = drawn_damper(draw, (0.0,))
+    before, after = state_of("new", outside(damper, draw, MOTIONS)), state_of("aged", outside(damper, draw, motions))
+    never = Missed(np.inf, np.zeros(1))  # the damper alone says nothing
+    compared = comparisons_of(before, after, IdentifyConfig(), DiagnoseConfig().nuisance, never)
+    return [float(c.missed[1]) / c.peak**2 for c in compared if c.missed is not None]
+
+
+def test_the_nearer_the_motion_that_was_run_before_the_less_is_missed(rng: np.random.Generator) -> None:
+    """By a linear variogram: in the mean square twice as much at twice the distance, here in frequency."""
+    near, far = carried(rng, ((2.0 * np.exp(0.1), 0.02), (2.0 * np.exp(0.2), 0.02)))
+    assert far / near == pytest.approx(2.0, rel=0.02)
+
+
+def test_what_the_model_hides_is_told_by_a_motion_of_the_first_state_run_again(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng, (0.0,))
+    states = (
+        state_of("new", outside(damper, rng, MOTIONS)),
+        state_of("aged", outside(damper, rng, ((1.0, 0.025), (1.3, 0.02)))),
+    )
+    changes = changes_between(*states, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+    assert names(changes) == []
+    assert changes.next_test is not None
+    assert changes.next_test.waveform.startswith("the motion of 0V-")
+    again = state_of("aged", outside(damper, rng, MOTIONS))
+    assert changes_between(states[0], again, DiagnoseConfig(), IdentifyConfig(), Control()).changes.next_test is None
+
+
+def test_the_gas_of_an_accumulator_is_among_what_may_have_changed(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng, (0.0,))
+    found = findings(rng, damper, damper.with_effect("accumulator", {"F_g": 60.0, "L": 3.0 * STROKE}))
+    assert "accumulator" in names_told(found.changes())
