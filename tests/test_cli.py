@@ -197,6 +197,7 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["compare"], 2, "pzd compare: Missing argument"),
         (["init", "absent.csv"], 2, "absent.csv: no such file; check the path"),
         (["init", "data"], 2, "data: this is a folder; name the files in it, e.g. data/*.csv"),
+        (["rate", "data"], 2, "data: this is a folder; name the files in it, e.g. data/*.csv"),
         (
             ["check", "first.yaml", "--plot", "no/such/page.html"],
             2,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,22 +26,14 @@ def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -
     """Print a config for rig files: by the layout that fits, else guessed from the headers."""
     from pzd.config import EDITORS, SCHEMA
     from pzd.rig.files.guess import guessed
-    from pzd.schema.errors import ConfigError
+    from pzd.schema.errors import ConfigError, no_file
 
     output = Output(verbose=verbose)
     absent = [path for path in files if not path.is_file()]
     if absent:
-        raise ConfigError(map(_absent, absent))
+        raise ConfigError(f"{path}: {no_file(path)}" for path in absent)
     output.say(f"{EDITORS}{SCHEMA.as_uri()}", *guessed(files, layout))
     return DONE
-
-
-def _absent(path: Path) -> str:
-    if path.is_dir():
-        endings = Counter(file.suffix for file in path.iterdir() if file.is_file() and file.suffix)
-        ending = max(endings, key=lambda one: endings[one], default=".csv")
-        return f"{path}: this is a folder; name the files in it, e.g. {path}/*{ending}"
-    return f"{path}: no such file; check the path"
 
 
 def schema(verbose: Verbose = False) -> int:

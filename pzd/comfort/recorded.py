@@ -18,7 +18,7 @@ from pzd.rig.config import FilesEntry
 from pzd.rig.files.formats import TEXT, read_sheet
 from pzd.rig.files.sheet import LIKE_A_CLOCK, Sheet, Wanted
 from pzd.rig.files.sniffing import Dialect, described
-from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.errors import ConfigError, DataError, no_file
 
 _EVEN = 0.01
 """Largest departure of a sample from an even clock, in steps, that is none: a stamp is rounded by as much."""
@@ -66,7 +66,7 @@ def read_ride(
     FilesError : when it cannot be read
     """
     if not path.is_file():
-        raise ConfigError(f"{path}: no such file; check the path")
+        raise ConfigError(f"{path}: {no_file(path)}")
     dialect, form = described(path)
     named = dict(columns or {})
     heads = {axis: _head_of(path, axis, dialect.header, named, alone=len(axes) == 1) for axis in axes}

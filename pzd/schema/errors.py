@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,6 +107,21 @@ class InsideError(ValueError):
         super().__init__(message)
         self.path = path
         self.of_key = of_key
+
+
+def no_file(path: Path, given: str | None = None) -> str:
+    """Say that a path is no file: a folder, in which files are to be named, or nothing.
+
+    Parameters
+    ----------
+    path : that is no file
+    given : how it was written; None for the path itself
+    """
+    if path.is_dir():
+        endings = Counter(file.suffix for file in path.iterdir() if file.is_file() and file.suffix)
+        ending = max(endings, key=lambda one: endings[one], default=".csv")
+        return f"this is a folder; name the files in it, e.g. {(given or str(path)).rstrip('/')}/*{ending}"
+    return "no such file; check the path"
 
 
 def read_text(path: Path, missing: type[UserError], advice: str) -> str:

@@ -10,13 +10,34 @@ from typing import Any
 
 import numpy as np
 import pytest
-from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write
+from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.config import load
 from pzd.quantities import Control
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import DataError, UserError
+
+# ---------------------------------------------------------------- paths, and faults of several files
+
+
+def test_a_folder_in_the_place_of_its_files_is_told_with_a_pattern_that_reads_them(tmp_path: Path) -> None:
+    (tmp_path / "bench").mkdir()
+    write(tmp_path / "bench" / "a.txt", lines(CANONICAL))
+    (said,) = wrong(tmp_path, {"path": "bench"})
+    (pattern,) = re.findall(r"this is a folder; name the files in it, e\.g\. (\S+)", said)
+    assert len(run(tmp_path, {"path": pattern}).records) == 1
+
+
+def test_a_wrong_unit_of_many_files_is_told_once_and_corrected_once(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        write(tmp_path / f"{name}.csv", lines({"time_s": TIME, "pos": X, "force_N": FORCE}))
+    entry = {"path": "*.csv", "columns": {"displacement": "pos"}}
+    (said,) = wrong(tmp_path, entry | {"units": {"displacement": "mmm"}})
+    assert said.endswith("a.csv and 2 more files)")
+    (unit,) = re.findall(r"write one like '(\w+)'", said)
+    assert len(run(tmp_path, entry | {"units": {"displacement": unit}}).records) == 3
+
 
 # ---------------------------------------------------------------- columns and headers
 

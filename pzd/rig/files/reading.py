@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -41,7 +41,7 @@ from pzd.rig.files.refusals import refuse, sign_faults, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.motion import recorded_velocity
-from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.errors import ConfigError, DataError, counted, no_file
 from pzd.schema.model import safe_name
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -58,6 +58,19 @@ class Listed:
     entry: FilesEntry
     number: int
     """Number of the entry in the config, from 0."""
+
+
+def _said_once(faults: Iterable[str], names: Collection[str]) -> list[str]:
+    """Say a fault of the config once, with the first of the files that show it, of these names, and how many more."""
+    found: dict[str, list[str]] = {}
+    for fault in dict.fromkeys(faults):
+        about, _, file = fault.removesuffix(")").rpartition(" (in ")
+        if Path(file).name in names:
+            found.setdefault(about, []).append(file)
+        else:
+            found[fault] = []
+    more = {about: f" and {counted(len(files) - 1, 'more file')}" for about, files in found.items() if files[1:]}
+    return [f"{about} (in {files[0]}{more.get(about, '')})" if files else about for about, files in found.items()]
 
 
 def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
@@ -78,7 +91,9 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
         place = f"rig.files.{number}"
         paths = matching(folder, entry.path)
         found += [Listed(path, entry, number) for path in paths]
-        if not paths:
+        if not paths and (folder / entry.path).is_dir():
+            faults.append(f"{place}.path: {no_file(folder / entry.path, entry.path)} (got {entry.path!r})")
+        elif not paths:
             hint = f"; {entry.source}" if entry.source else "; the path is relative to the config's folder"
             faults.append(f"{place}.path: no such file under {folder}{hint} (got {entry.path!r})")
     faults += _conflicts(found)
@@ -322,7 +337,7 @@ def read(
             tests += [(store.kept(test), store.kept(alone)) for test, alone in made[1]]
     end_child()
     if config_faults:
-        raise ConfigError(dict.fromkeys(config_faults))
+        raise ConfigError(_said_once(config_faults, {file.path.name for file in files}))
     by_work: dict[bool, list[tuple[RawRecord, DamperAlone]]] = {False: [], True: []}
     for both in one_at_a_time(tests):
         by_work[works_on_the_rig(both[1])].append(both)
