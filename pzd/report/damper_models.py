@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.damper.compose import respond, static_force
 from pzd.damper.confounders import known, module_of
 from pzd.damper.fitted_laws import fitted_laws
-from pzd.damper.model import BaseRow
+from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.data import PreparedRecord, prepare
+from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.record import Array, Record
 from pzd.report.blocks import amount
 from pzd.report.rig_tests import settled
@@ -49,17 +53,19 @@ class DamperModels:
         return "knee law" if self.fitted_law else "simple model"
 
     def simulated(self, record: Record) -> tuple[Array, Array]:
-        """Simulate both dampers in the motion of a record.
+        """Simulate both dampers in the motion of a record: the force that diagnose judges, drawn where it was judged.
+
+        That is in the motion freed of noise, which a stiff oil spring makes a force of. Outside the whole cycles, and
+        of a test that diagnose does not prepare, the motion is the recorded one.
 
         Returns
         -------
         (n,) force of the baseline and (n,) of the final damper [N]
         """
         if record.name not in self._forces:
-            motion = Motion.of(record)
-            start = float(record.force[0])
-            baseline = respond(self.diagnosed.baseline, motion, start)
-            final = respond(self.diagnosed.damper, motion, start) if self.extended else baseline
+            prepared = prepare((record,))
+            baseline = _force(self.diagnosed.baseline, record, prepared)
+            final = _force(self.diagnosed.damper, record, prepared) if self.extended else baseline
             self._forces[record.name] = (baseline, final)
         return self._forces[record.name]
 
@@ -78,6 +84,15 @@ class DamperModels:
         """Return the range of the static force, `90 N` or `80 N to 90 N`; empty where it is 0 throughout."""
         forces = [self.static_force(voltage) for voltage in voltages]
         return " to ".join(dict.fromkeys(amount(end(forces), "N") for end in (min, max))) if any(forces) else ""
+
+
+def _force(damper: Damper, record: Record, prepared: Sequence[PreparedRecord]) -> Array:
+    """Compute the (n,) force of a damper in a record, as judged in its prepared parts [N]."""
+    force = respond(damper, Motion.of(record), float(record.force[0]))
+    for part in prepared:
+        first = int(np.argmin(np.abs(record.time - part.record.time[0])))
+        force[first : first + part.record.time.size] = predicted_force(damper, part)
+    return force
 
 
 def _fitted_row(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:

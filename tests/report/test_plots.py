@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.data import prepare
+from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.record import Array, Record
 from pzd.report.damper_models import DamperModels
 from pzd.report.drawing import axes, encoded, styled
@@ -46,6 +49,25 @@ def test_a_force_that_differs_only_until_the_motion_has_turned_leaves_no_gap() -
     record = sine(force)
     context = context_of(record, baseline=0.9 * force, final=begun_elsewhere)
     assert record_gap(context, record) == pytest.approx((0.01, 0.0), abs=1e-12)
+
+
+def test_the_force_drawn_is_the_one_judged(rng: np.random.Generator) -> None:
+    """Noise of 10 um through an oil spring of 3e6 N/m is a force of 30 N, which diagnose does not judge."""
+    damper = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=1000.0, k_N_per_m=3e6),))
+    clean = sine(np.zeros(6000), frequency=2.0)
+    truth = respond(damper, Motion.of(clean), 0.0)
+    noisy = clean.displacement + 1e-5 * rng.standard_normal(clean.time.size)
+    velocity = np.gradient(noisy, clean.time)
+    recorded = replace(
+        clean, displacement=noisy, velocity=velocity, acceleration=np.gradient(velocity, clean.time),
+        force=truth + 2.0 * rng.standard_normal(truth.size),
+    )  # fmt: skip
+    diagnosed = SimpleNamespace(baseline=damper, damper=damper)
+    drawn, _ = DamperModels(diagnosed, ()).simulated(recorded)  # type: ignore[arg-type]  # two dampers are all it asks
+    (part,) = prepare((recorded,))
+    inside = np.isin(recorded.time, part.record.time)
+    np.testing.assert_array_equal(drawn[inside], predicted_force(damper, part))
+    assert np.std((drawn - truth)[500:-500]) < 5.0
 
 
 def test_the_band_of_a_harmonic_holds_its_power() -> None:
