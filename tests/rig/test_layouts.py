@@ -169,6 +169,14 @@ def test_init_finds_the_layout_of_a_file_and_it_reads_every_value(tmp_path: Path
         assert record.force == pytest.approx(FORCE, abs=1e-4)
 
 
+def test_a_layout_of_another_control_signal_says_how_the_config_declares_it(tmp_path: Path) -> None:
+    name, (file, written, _) = next((name, each) for name, each in FILES.items() if each[1] is valve)
+    written(tmp_path / file)
+    (said,) = wrong(tmp_path, {"path": file, "layout": name})
+    ((control, unit),) = re.findall(r"say at the top of the config control: \{name: (\w+), unit: (\w+)\}", said)
+    assert len(run(tmp_path, {"path": file, "layout": name}, control=Control(control, unit)).records) == 1
+
+
 def test_clickers_pressure_temperature_and_currents_come_with_their_layouts(tmp_path: Path) -> None:
     dyno(tmp_path / "C08_R12_150psi_0.131mps.csv")
     (record,) = run(tmp_path, {"path": "*.csv", "layout": "dyno_volts_units"}).records

@@ -169,6 +169,24 @@ def test_clocks_that_cannot_be_aligned_are_refused(
 
 
 @pytest.mark.parametrize(
+    ("way", "change", "advice", "remedy"),
+    [
+        ({"event": ["Pos [mm]", "Sync"]}, None, "or say column", {"column": WAYS["column"]}),
+        ({"column": ["Trig", "Weg [V]"]}, None, "name a column that both recorded", {"column": WAYS["column"]}),
+        ({"column": ["Trig", "Weg [V]"]}, None, "or an event", {"event": WAYS["event"]}),
+        ({"column": WAYS["column"]}, "repeats", "or say event", {"event": WAYS["event"]}),
+    ],
+)
+def test_what_the_refusal_advises_aligns_the_clocks(
+    way: dict[str, Any], change: str | None, advice: str, remedy: dict[str, Any], tmp_path: Path
+) -> None:
+    loggers(tmp_path, repeats=change == "repeats")
+    with pytest.raises(DataError, match=advice):
+        run(tmp_path, entry(**way))
+    assert found(run(tmp_path, entry(**remedy)))[0] == pytest.approx(DAMPING, rel=0.01)
+
+
+@pytest.mark.parametrize(
     ("beside", "words"),
     [
         ({}, "exactly one of same_clock, event, column"),
