@@ -105,6 +105,15 @@ def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not(rng: np.rando
     assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.02)
 
 
+def test_the_interval_of_a_stiff_oil_spring_is_that_of_its_compliance(rng: np.random.Generator) -> None:
+    """The misfit is a parabola in 1/k, not in k: the interval reaches farther up than down, as the profile does."""
+    row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 1e7), 2.0, 0.02), rng))
+    low, k, high = row.k_N_per_m_low95, row.k_N_per_m, row.k_N_per_m_high95
+    assert 1.0 / low - 1.0 / k == pytest.approx(1.0 / k - 1.0 / high, rel=1e-6)
+    assert high - k > 1.2 * (k - low)
+    assert low < 1e7 < high
+
+
 def test_displacement_noise_that_hides_the_oil_spring_is_named(rng: np.random.Generator) -> None:
     record = sine_test(Bingham(400.0, 2500.0, 3e7), 2.0, 0.02)
     noisy = replace(record, displacement=record.displacement + 1e-5 * rng.standard_normal(record.time.size))
