@@ -73,7 +73,8 @@ def conclude(
         extended = add_predictive_effects(adoption, validation, config)
         adoption = _polished(predicting(extended, validation, config.force))
         if extended.selection.adopted and not adoption.selection.adopted:
-            words = "kept-back tests are predicted no better with it than by the plain damper, which is handed on"
+            tried = " and ".join(extended.selection.adopted)
+            words = f"with {tried} not all kept-back tests are predicted better, and the plain damper is handed on"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
         if added := adoption.added:
             stands = "it stands" if len(added) == 1 else "they stand"
