@@ -65,7 +65,7 @@ def _said_once(faults: Iterable[str], names: Collection[str]) -> list[str]:
     found: dict[str, list[str]] = {}
     for fault in dict.fromkeys(faults):
         about, _, file = fault.removesuffix(")").rpartition(" (in ")
-        if Path(file).name in names:
+        if about and Path(file).name in names:
             found.setdefault(about, []).append(file)
         else:
             found[fault] = []
