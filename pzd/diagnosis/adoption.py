@@ -16,6 +16,7 @@ import numpy as np
 from pzd.artefacts import Prediction
 from pzd.damper.effects import library
 from pzd.damper.model import against_nature
+from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
@@ -23,7 +24,7 @@ from pzd.diagnosis.fit.least_squares import refit
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names, improves
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
-from pzd.fit.cross_validation import PredictionError
+from pzd.fit.cross_validation import STANDARD_ERRORS, PredictionError, predicts_better
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
@@ -273,8 +274,20 @@ def predicting(adoption: Adoption, validation: CrossValidation, forced: Sequence
     forced : effects that the config asks for, whatever they do
     """
     selection, plain = adoption.selection, adoption.baseline_error
-    better = improves(adoption.error, plain, validation) and not validation.much_worse_in(adoption.error, plain)
-    if not selection.adopted or forced or better:
+    if not selection.adopted or forced:
+        return adoption
+    if _predicts(adoption.error, plain, validation) and not validation.much_worse_in(adoption.error, plain):
         return adoption
     kept = _plain(selection, {**selection.reasons, **dict.fromkeys(selection.adopted, NO_BETTER)})
     return Adoption(kept, plain, plain, validation.baseline_interpolation_error)
+
+
+def _predicts(one: PredictionError, plain: PredictionError, validation: CrossValidation) -> bool:
+    """Whether held-out tests are predicted better than by the baseline, at no voltage worse.
+
+    Two standard errors over all tests are enough: what was selected was so by the likelihood, and not by these errors.
+    """
+    if improves(one, plain, validation):
+        return True
+    less = (one.criterion or 0.0) <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * (plain.criterion or 0.0)
+    return less and predicts_better(one, plain, STANDARD_ERRORS) and not validation.worse_at(one, plain)
