@@ -24,7 +24,7 @@ from pzd.diagnosis.fit.least_squares import refit
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names, improves
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
-from pzd.fit.cross_validation import STANDARD_ERRORS, PredictionError, predicts_better
+from pzd.fit.cross_validation import STANDARD_ERRORS, PredictionError, log_ratios, paired_t
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
@@ -276,7 +276,7 @@ def predicting(adoption: Adoption, validation: CrossValidation, forced: Sequence
     selection, plain = adoption.selection, adoption.baseline_error
     if not selection.adopted or forced:
         return adoption
-    if _predicts(adoption.error, plain, validation) and not validation.much_worse_in(adoption.error, plain):
+    if _predicts(adoption.error, plain, validation):
         return adoption
     kept = _plain(selection, {**selection.reasons, **dict.fromkeys(selection.adopted, NO_BETTER)})
     return Adoption(kept, plain, plain, validation.baseline_interpolation_error)
@@ -285,9 +285,11 @@ def predicting(adoption: Adoption, validation: CrossValidation, forced: Sequence
 def _predicts(one: PredictionError, plain: PredictionError, validation: CrossValidation) -> bool:
     """Whether held-out tests are predicted better than by the baseline, at no voltage worse.
 
-    Two standard errors over all tests are enough: what was selected was so by the likelihood, and not by these errors.
+    Either test by test, each counted alike, by two standard errors: what was selected was so by the likelihood, and not
+    by these errors. Or as an effect is added, which few tests may show, and then none is predicted much worse.
     """
-    if improves(one, plain, validation):
+    if improves(one, plain, validation) and not validation.much_worse_in(one, plain):
         return True
     less = (one.criterion or 0.0) <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * (plain.criterion or 0.0)
-    return less and predicts_better(one, plain, STANDARD_ERRORS) and not validation.worse_at(one, plain)
+    alike = one.visibly_below(plain) and paired_t(log_ratios(one, plain)) > STANDARD_ERRORS
+    return less and alike and not validation.worse_at(one, plain)

@@ -257,22 +257,16 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
     return _error_is_larger(one, other, student_errors(len(one.records)))
 
 
-def predicts_better(one: PredictionError, other: PredictionError, errors: float | None = None) -> bool:
-    """Whether one model predicts better than another: visibly, and beyond chance.
+def predicts_better(one: PredictionError, other: PredictionError) -> bool:
+    """Whether one model predicts better than another: visibly, and beyond chance however few the tests.
 
     The differences may be those of the logarithms too: an effect that shows much in one test and little in another, and
     takes the same share of either error, is no chance.
-
-    Parameters
-    ----------
-    one, other : errors of the two on the same tests
-    errors : standard errors that are asked for; None for those of Student's t, where it was these tests that chose the
-        model among several
     """
-    asked = student_errors(len(one.records)) if errors is None else errors
-    if _error_is_larger(other, one, asked):
+    errors = student_errors(len(one.records))
+    if _error_is_larger(other, one, errors):
         return True
-    return one.visibly_below(other) and paired_t(log_ratios(one, other)) > asked
+    return one.visibly_below(other) and paired_t(log_ratios(one, other)) > errors
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:

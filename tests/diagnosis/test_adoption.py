@@ -143,8 +143,8 @@ def test_effects_that_worsen_the_interpolation_are_removed(
 
 @pytest.mark.parametrize(
     ("shares", "kept"),
-    [((0.5,) * 8, True), ((1.0,) * 8, False), ((0.3,) * 7 + (1.4,), True), ((0.3,) * 7 + (1.6,), False)],
-    ids=["each by half", "no better", "one a little worse", "one much worse"],
+    [((0.5,) * 8, True), ((1.0,) * 8, False), ((0.3,) * 7 + (1.6,), True), ((0.2, 1.6) * 4, False)],
+    ids=["each by half", "no better", "seven of eight", "half of them much worse"],
 )
 def test_where_something_has_no_name_effects_are_handed_on_only_if_they_predict_better(
     shares: tuple[float, ...], kept: bool, rng: np.random.Generator
