@@ -260,8 +260,8 @@ def add_predictive_effects(adoption: Adoption, validation: CrossValidation, conf
     return Adoption(extended, *errors, by_criterion=True, added=added, alternatives=search.alternatives)
 
 
-def predicting(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Adoption:
-    """Return what is handed on where something has no name: the damper with effects only where it predicts better.
+def plain_unless_better(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Adoption:
+    """Return the damper that is handed on where something has no name: with effects only if it predicts better.
 
     A gap that a name explains speaks for the effect by itself. Where a law is missing the likelihood bends each effect
     towards it, and that held-out tests are predicted no worse is too little: the plain damper does that as well. So is

@@ -17,7 +17,7 @@ from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRo
 from pzd.damper.confounders import known
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
-from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, predicting
+from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
 from pzd.diagnosis.campaign import Campaign, nearest_row
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
@@ -71,10 +71,10 @@ def conclude(
             decision = Decision("unexplained", f"{decision.reason}; but {trend}", None)
     if decision.verdict == "unexplained":
         extended = add_predictive_effects(adoption, validation, config)
-        adoption = _polished(predicting(extended, validation, config.force))
+        adoption = _polished(plain_unless_better(extended, validation, config.force))
         if extended.selection.adopted and not adoption.selection.adopted:
             tried = " and ".join(extended.selection.adopted)
-            words = f"with {tried} not all kept-back tests are predicted better, and the plain damper is handed on"
+            words = f"with {tried} kept-back tests are predicted no better than by the plain damper, which is handed on"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
         if added := adoption.added:
             stands = "it stands" if len(added) == 1 else "they stand"

@@ -122,6 +122,8 @@ def oil_spring_alone(records: Sequence[Record], objective: Objective, nuisance: 
     moved = [x - x.mean() for x, _ in pairs]
     forces = [force - force.mean() for _, force in pairs]
     x, force = np.concatenate(moved), np.concatenate(forces)
+    if not x.any():
+        return None
     stiffness = float(x @ force) / float(x @ x)
     if stiffness <= 0.0 or rms(force - stiffness * x) > LARGEST_RESIDUAL * rms(force):
         return None

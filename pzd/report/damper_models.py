@@ -55,8 +55,8 @@ class DamperModels:
     def simulated(self, record: Record) -> tuple[Array, Array]:
         """Simulate both dampers in the motion of a record: the force that diagnose judges, drawn where it was judged.
 
-        That is in the motion freed of noise, which a stiff oil spring makes a force of. Outside the whole cycles, and
-        of a test that diagnose does not prepare, the motion is the recorded one.
+        That is in the motion freed of noise, which a stiff oil spring makes a force of. Outside the whole cycles, which
+        diagnose does not judge, the motion is the recorded one.
 
         Returns
         -------

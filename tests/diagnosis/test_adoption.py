@@ -20,7 +20,7 @@ from pzd.diagnosis.adoption import (
     Adoption,
     add_predictive_effects,
     adopt_effects,
-    predicting,
+    plain_unless_better,
 )
 from pzd.diagnosis.campaign import Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
@@ -154,11 +154,11 @@ def test_where_something_has_no_name_effects_are_handed_on_only_if_they_predict_
     tests = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
     plain = PredictionError(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
     adoption = Adoption(named, plain, replace(plain, error=np.array(shares)), plain)
-    found = predicting(adoption, tests, ())
+    found = plain_unless_better(adoption, tests, ())
     assert found.selection.adopted == (("asymmetry",) if kept else ())
     assert found.error is (adoption.error if kept else plain)
     assert (found.selection.reasons["asymmetry"] == NO_BETTER) is not kept
-    assert predicting(adoption, tests, ("asymmetry",)) is adoption
+    assert plain_unless_better(adoption, tests, ("asymmetry",)) is adoption
 
 
 def test_a_forced_effect_is_adopted_whatever_it_does(rng: np.random.Generator) -> None:

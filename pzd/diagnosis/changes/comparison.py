@@ -647,16 +647,12 @@ class Findings:
         if c.name in ELEMENT_COLUMNS:
             return self._element_values(mine)
         own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
+        nodes = self.first.damper.effects[c.name]["at_voltage_V"] if isinstance(own, tuple) else None
+        at = cast("tuple[float, ...] | None", nodes)
         if not np.isfinite(e):
-            at = (
-                cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
-                if isinstance(own, tuple)
-                else None
-            )
             return at, own, None, None, None
         if isinstance(own, tuple):
             ends = np.sort([values_by_control(c, own, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0)], axis=0)
-            at = cast("tuple[float, ...]", self.first.damper.effects[c.name]["at_voltage_V"])
             return at, own, tuple(ends[1].tolist()), tuple(ends[0].tolist()), tuple(ends[2].tolist())
         neutral = known_parameter(c.name, c.parameter).neutral
         start_value = own if own is not None else (neutral if np.isfinite(neutral) else None)

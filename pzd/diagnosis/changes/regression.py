@@ -277,8 +277,7 @@ class Regression:
     def covariance(self, fitted: Fitted) -> Array:
         """Compute the (p, p) covariance of the coordinates, wider where the tests disagree by more than the scatter.
 
-        Equation: (J' J)^-1 max(1, |r|^2 / (n - p), R_j), R_j of the tests' pulls
-                                            Source: Birge 1932; cluster-robust variance, Bell and McCaffrey 2002
+        Equation: (J' J)^-1 sqrt(w_i w_j), w as in `pzd.fit.intervals.widening`
         """
         whiteners = self.likelihood.whiteners(fitted.scatter)
         J = [W @ own for W, own in zip(whiteners, self.columns(fitted.coordinates, fitted.values), strict=True)]
