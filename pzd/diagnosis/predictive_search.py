@@ -27,7 +27,14 @@ from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.search.candidates import Candidate, candidate, most_promising, per_voltage_candidates, testable
+from pzd.diagnosis.search.candidates import (
+    Candidate,
+    candidate,
+    most_promising,
+    per_voltage_candidates,
+    problem_for,
+    testable,
+)
 from pzd.diagnosis.search.determination import MAY_BE_OFF, showing, undetermined
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array
@@ -160,7 +167,8 @@ class PredictiveSearch:
         def proposal(each: Candidate) -> _Proposal | None:
             if each.explained < self.config.visible or against_nature(each.fitted.damper):
                 return None
-            own = replace(problem, per_voltage=problem.per_voltage | ({each.effect} if each.varies else set()))
+            own = problem_for(problem, library()[each.effect])  # it may have fewer base rows
+            own = replace(own, per_voltage=own.per_voltage | ({each.effect} if each.varies else set()))
             none = undetermined(own, each.fitted).get(each.effect, MAY_BE_OFF) != MAY_BE_OFF
             return None if none else _Proposal.of(own, each.fitted, self.validation)
 

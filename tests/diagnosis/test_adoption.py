@@ -26,9 +26,9 @@ from pzd.diagnosis.campaign import Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.predictive_search import interpolation_check
+from pzd.diagnosis.predictive_search import PredictiveSearch, interpolation_check
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import candidates, per_voltage_candidates, starts_of
+from pzd.diagnosis.search.candidates import candidate, candidates, per_voltage_candidates, starts_of
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Record
 
@@ -285,6 +285,32 @@ def test_what_goes_with_t0_starts_in_proportion_to_it_at_each_voltage(rng: np.ra
         for name in ("T0_2", "k_2"):
             soft, hard = values[name]
             assert soft / hard == pytest.approx(share, rel=1e-9)
+
+
+def test_beside_a_drift_that_pools_temperatures_a_second_effect_can_be_tried(rng: np.random.Generator) -> None:
+    """Fitted with the drift, the rows of two temperatures are one: what follows begins there."""
+    rows = tuple(
+        row.model_copy(update={"temperature_degC": degC, "T0_N": row.T0_N * factor})
+        for row in damper_of(TWO).base
+        for degC, factor in ((20.0, 1.0), (40.0, 0.8))
+    )
+    base = Damper(base=rows, reference_temperature_degC=20.0)
+    records = tuple(
+        replace(record, name=f"{record.name}-{degC:g}", temperature=np.full(record.time.size, degC))
+        for degC, factor in ((20.0, 1.0), (40.0, 0.8))
+        for record in sines(
+            Damper(base=tuple(r.model_copy(update={"T0_N": factor * r.T0_N}) for r in damper_of(TWO).base)),
+            rng, TWO, tests=OTHER_TESTS, cycles=3,
+        )
+    )  # fmt: skip
+    campaign, config = campaign_of(records), DiagnoseConfig(visible=1e-9)  # the drift says what the rows say
+    evidence = evidence_of(campaign, base)
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    search = PredictiveSearch(cross_validation_of(campaign, base, config.visible), config, 2)
+    drift = candidate(evidence.whole, plain, library()["temperature_drift"])
+    (proposal,) = search._possible(evidence.whole, [drift])
+    assert len(proposal.problem.base) == len(TWO) < len(base.base)
+    search._additions(proposal.problem, proposal.fitted)
 
 
 def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generator) -> None:

@@ -200,7 +200,7 @@ def candidates(
     _ = before.column_basis  # every candidate needs it: computed once, before they go to threads of their own
 
     def promised(effect: Effect) -> float:
-        return promised_drop(problem, before, effect) if _problem_for(problem, effect) is problem else np.inf
+        return promised_drop(problem, before, effect) if problem_for(problem, effect) is problem else np.inf
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         gains = list(pool.map(promised, tried))
@@ -220,7 +220,7 @@ def candidates(
 
 def resumed(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
     """Continue the search for a candidate that was broken off early."""
-    return _fitted_from(_problem_for(problem, known()[found.effect]), before, found.effect, found.fitted.optimum)
+    return _fitted_from(problem_for(problem, known()[found.effect]), before, found.effect, found.fitted.optimum)
 
 
 def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array | None = None) -> Candidate:
@@ -229,7 +229,7 @@ def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array 
     Others, then ever fainter ones, are tried only while the fit is worse than without the effect: such a search got
     stuck, for being switched off is one of the effect's own values.
     """
-    problem, reached = _problem_for(problem, effect), list[Candidate]()
+    problem, reached = problem_for(problem, effect), list[Candidate]()
     starts = sorted_starts(problem, before, effect) if start is None else [start]
     faint = (towards_neutral(problem, before, effect, starts[0], share) for share in thresholds.SMALLER_STARTS)
     for each in itertools.chain(starts[: thresholds.STARTS_TRIED], faint):
@@ -320,7 +320,7 @@ def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidat
     if found.varies:
         return _fitted_per_voltage(problem, before, found.effect, thresholds.MOST_EVALUATIONS_OF_BEST)
     effect = known()[found.effect]
-    problem = _problem_for(problem, effect)
+    problem = problem_for(problem, effect)
     others = [np.concatenate([_search_start(problem, before), s]) for s in sorted_starts(problem, before, effect)[1:]]
     fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
@@ -337,7 +337,7 @@ def nearly_as_good(
     )
 
 
-def _problem_for(problem: Problem, effect: Effect) -> Problem:
+def problem_for(problem: Problem, effect: Effect) -> Problem:
     """Return the problem on which an effect is tried: a material effect replaces the temperature axis."""
     return problem.pooled_temperatures() if effect.place == "material" else problem
 
