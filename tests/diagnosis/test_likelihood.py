@@ -62,7 +62,7 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
         (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
         run = prepared.cycles
         assert run is not None
-        variance = predict(stuck, prepared, 0.0).displacement_variance
+        variance = predict(stuck, prepared, 0.0).shared_variance
         assert isinstance(variance, np.ndarray)
         assert variance[0] == 0.0
         single = noise**2 / run.points(prepared.record.time) / run.count

@@ -134,8 +134,9 @@ class PredictedForce:
     damper: Damper
     force: Array
     """(n,) [N]."""
-    displacement_variance: Array | float
-    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
+    shared_variance: Array | float
+    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by what all cycles share, the errors of the
+    displacement and mains in step with them [N^2]; 0 where none repeats."""
     timing: Array
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
     drawn: tuple[tuple[Record, Array], ...]
@@ -156,7 +157,8 @@ def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> Predicted
     if prepared.lead is None:
         drawn = tuple((draw, simulated_record(damper, draw)) for draw in prepared.draws[1:])
         return PredictedForce(damper, force, 0.0, timing, drawn)
-    return PredictedForce(damper, force, displacement_variance(damper, prepared), timing, ())
+    shared = displacement_variance(damper, prepared) + prepared.hum_variance
+    return PredictedForce(damper, force, shared, timing, ())
 
 
 def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = False) -> Array:
