@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import respond
+from pzd.damper.compose import jump_at_reversal, respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnosis.data import PreparedRecord
@@ -164,7 +164,9 @@ def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> Predicted
 def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = False) -> Array:
     """Return (n,) by how much the friction of a damper may be off beside a reversal that no sample resolves [N].
 
-    Equation: 2 T0 where the rod goes more than 2 T0/k within an interval, else 0
+    A seal beside the element turns at once, however finely the motion is sampled.
+
+    Equation: 2 T0 where the rod goes more than 2 T0/k within an interval, else 0; and the jump of the parallel forces
 
     Parameters
     ----------
@@ -172,11 +174,13 @@ def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = Fals
     displacement : (n,) cleaned [m]
     closed : whether the last sample is followed by the first
     """
-    friction = max(row.T0_N for row in damper.base)
-    if friction == 0.0:
-        return np.zeros(displacement.size)
     travel = max(2.0 * row.T0_N / row.k_N_per_m for row in damper.base)
-    return np.where(beside_unresolved_reversals(displacement, travel, closed=closed), 2.0 * friction, 0.0)
+    turns = (2.0 * max(row.T0_N for row in damper.base), travel), (jump_at_reversal(damper), 0.0)
+    off = np.zeros(displacement.size)
+    for force, until_turned in turns:
+        if force > 0.0:
+            off += force * beside_unresolved_reversals(displacement, until_turned, closed=closed)
+    return off
 
 
 def drawn_calm(given: PredictedForce, calm: Mask, counted: Mask) -> list[tuple[Record, Array]]:
