@@ -134,7 +134,7 @@ def parallel_force_along(motion: Motion, parallel: Array) -> Array:
 
 
 _STANDSTILL = 1e-9
-"""Speed to either side of standstill at which a force beside the element is compared [m/s]: slower than any friction."""
+"""Speed to either side of standstill at which forces beside the element are compared [m/s]: no friction is slower."""
 
 
 def jump_at_reversal(damper: Damper) -> float:
