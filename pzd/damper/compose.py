@@ -133,6 +133,24 @@ def parallel_force_along(motion: Motion, parallel: Array) -> Array:
     return force + branch_forces(motion, parallel) if any_slips(parallel) else force
 
 
+_STANDSTILL = 1e-9
+"""Speed to either side of standstill at which forces beside the element are compared [m/s]: no friction is slower."""
+
+
+def jump_at_reversal(damper: Damper) -> float:
+    """Compute by how much the forces beside the element jump where the rod reverses [N]: twice a seal's friction.
+
+    Parameters
+    ----------
+    damper : of which the voltage with the largest jump counts
+    """
+    either_way, still = np.array([-_STANDSTILL, _STANDSTILL]), np.zeros(2)
+    voltages = [None if row.voltage_V is None else np.array([row.voltage_V]) for row in damper.base]
+    rows = [parallel_rows(damper, voltage) for voltage in voltages]
+    forces = [kernels.parallel_forces(still, either_way, still, each) for each in rows if each is not None]
+    return max((abs(float(force[1] - force[0])) for force in forces), default=0.0)
+
+
 def parallel_force_change(motions: tuple[Motion, Motion], rows: tuple[Array, Array]) -> Array:
     """Compute by how much the parallel forces differ (n,) between two sets of parameters [N].
 

@@ -63,6 +63,8 @@ class PreparedRecord:
     """Average cycle of the displacement, where it repeats."""
     read_alike: int = 1
     """Tests of the rig, this one among them, in which the steps of the displacement err alike."""
+    hum_variance: Array | float = 0.0
+    """(H + 1,) variance |.|^2 of the harmonics of the average cycle of the force by mains in step with it [N^2]."""
 
     @cached_property
     def folded(self) -> Array:

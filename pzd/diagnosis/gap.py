@@ -99,7 +99,7 @@ def check_residual(
     explained = mains + min(ways, key=lambda way: float(np.sum((without - way)[mask] ** 2)))
     folded = _folded(prepared, residual - explained, mask)
     if folded is not None:
-        found = _check_cycles(prepared, mask, residual, explained, folded, given.displacement_variance)
+        found = _check_cycles(prepared, mask, residual, explained, folded, given.shared_variance)
     else:
         found = _check_samples(prepared, mask, residual, explained, predicted, drawn_calm(given, calm, mask))
     return replace(found, hum=float(np.max(np.abs(mains))))
@@ -152,9 +152,9 @@ def _check_cycles(
     residual: Array,
     nuisances: Array,
     folded: Array,
-    by_displacement: Array | float,
+    shared: Array | float,
 ) -> ResidualCheck:
-    error = replace(pure_error(folded), shared=by_displacement)
+    error = replace(pure_error(folded), shared=shared)
     trend = lack_of_fit.p_value_of_trend(folded)
     probability = {"harmonics": lack_of_fit.p_values_by_harmonics(error)}
     if trend is not None:

@@ -33,6 +33,7 @@ from pzd.diagnosis.fit.least_squares import base_half_widths, fit, refit, standa
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
+from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.forward_selection import select_effects
@@ -81,6 +82,7 @@ def diagnose_setting(
     prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
     roles = data.split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     baseline = base_of(identified.rows, setting)
+    prepared = with_hum(prepared, baseline)
     campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     if all(row.shows_oil_spring_alone for row in rows):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,6 +180,12 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     return wave
 
 
+Line = tuple[int, float]
+"""A line of the mains: its order, and the frequency of the mains [Hz]."""
+MAINS_LINES: tuple[Line, ...] = tuple((order, mains) for order in MAINS_ORDERS for mains in MAINS)
+"""Every line of the mains of the world."""
+
+
 def mains_harmonics(cycle: float, last: int, resolution: float) -> Mask:
     """Return (last + 1,) which harmonics of a motion lie upon a line of the mains, so that it stands in every cycle.
 
@@ -189,9 +195,49 @@ def mains_harmonics(cycle: float, last: int, resolution: float) -> Mask:
     last : highest harmonic
     resolution : of the record, the inverse of its length [Hz]
     """
-    orders = np.arange(last + 1) * cycle
-    lines = ((h * mains, h * MAINS_TOLERANCE + resolution) for h in MAINS_ORDERS for mains in MAINS)
-    return np.asarray(np.any([np.abs(orders - line) <= wide for line, wide in lines], axis=0))
+    return np.asarray(np.any([_upon(line, cycle, last, resolution) for line in MAINS_LINES], axis=0))
+
+
+def _upon(line: Line, cycle: float, last: int, resolution: float) -> Mask:
+    """Return (last + 1,) which harmonics of a motion lie upon one line of the mains."""
+    (order, mains), harmonics = line, np.arange(last + 1) * cycle
+    return np.asarray(np.abs(harmonics - order * mains) <= order * MAINS_TOLERANCE + resolution)
+
+
+def mains_amplitudes(residual: Array, rate: float, cycle: float, least: float) -> dict[Line, float]:
+    """Return the amplitudes of the lines of the mains that are prominent and upon no low harmonic of the motion.
+
+    Parameters
+    ----------
+    residual : (n,) of a channel, the known motion subtracted
+    rate : sampling rate [Hz]
+    cycle : frequency of the motion, 0 where it does not repeat [Hz]
+    least : amplitude up to which a line counts as none, in the unit of the channel
+    """
+    shown = {}
+    for order, mains in MAINS_LINES:
+        line = order * mains
+        if rate >= LEAST_RATE * line and not _is_motion_harmonic(line, cycle, rate / residual.size):
+            (amplitude,) = line_amplitudes(residual, rate, [line], cycle)
+            if amplitude > least:
+                shown[order, mains] = amplitude
+    return shown
+
+
+def hum_variance(amplitudes: Mapping[Line, float], cycle: float, last: int, resolution: float) -> Array:
+    """Return (last + 1,) variance |.|^2 of the harmonics of an average cycle by a hum of any phase in step with it.
+
+    Equation: sum_l (A_l / 2)^2 over the lines l upon which a harmonic lies             Source: Parseval
+
+    Parameters
+    ----------
+    amplitudes : of the lines of the mains
+    cycle : frequency of the motion [Hz]
+    last : highest harmonic
+    resolution : of the record, the inverse of its length [Hz]
+    """
+    lines = (_upon(line, cycle, last, resolution) * (0.5 * size) ** 2 for line, size in amplitudes.items())
+    return np.asarray(sum(lines, start=np.zeros(last + 1)))
 
 
 def _waves(frequency: float, time: Array) -> Array:

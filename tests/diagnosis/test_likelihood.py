@@ -17,10 +17,16 @@ from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import MarginalisedNuisances, WeightedRecord, prompt_force, shown_force
+from pzd.diagnosis.fit.likelihood import (
+    MarginalisedNuisances,
+    WeightedRecord,
+    prompt_force,
+    shown_force,
+    weighted_record,
+)
 from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
 from pzd.diagnosis.search.candidates import candidate
-from pzd.record import Array, Record
+from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
 
 
@@ -62,7 +68,7 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
         (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
         run = prepared.cycles
         assert run is not None
-        variance = predict(stuck, prepared, 0.0).displacement_variance
+        variance = predict(stuck, prepared, 0.0).shared_variance
         assert isinstance(variance, np.ndarray)
         assert variance[0] == 0.0
         single = noise**2 / run.points(prepared.record.time) / run.count
@@ -279,3 +285,21 @@ def test_the_likeliest_nuisances_are_those_of_ridge_regression(columns: Columns,
 def test_without_nuisances_marginalisation_changes_nothing(rng: np.random.Generator) -> None:
     r = rng.standard_normal((RESIDUALS, 2))
     np.testing.assert_array_equal(MarginalisedNuisances.none(RESIDUALS).marginalised(r), r)
+
+
+def test_a_seal_that_turns_between_two_samples_leaves_the_true_damper_what_noise_leaves(
+    rng: np.random.Generator,
+) -> None:
+    # At 500 Hz a cycle has 89.93 samples: each reverses elsewhere between two of them, and their mean does not jump.
+    true = damper_of((0.0,), stribeck_friction={"F_s": 56.0, "v_s": 0.11})
+    fine = sine(true, 0.0, 5.56, 0.02, rng, noise=0.0015, colour=0.0, rate=5000.0)
+    for first in range(10):
+        record = sliced(fine, np.arange(fine.time.size) % 10 == first)
+        (prepared,) = prepare([record])
+        everything = np.ones(prepared.record.time.size, dtype=np.bool_)
+        given = predict(true, prepared, 5e-4)
+        observed = weighted_record(prepared, everything, 0, given, NuisanceConfig())
+        assert observed is not None
+        force, sensors = prompt_force(observed, true)
+        left = observed.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)[:, 0]
+        assert left @ left < left.size + 4.0 * np.sqrt(2.0 * left.size)  # four standard deviations of chi-square

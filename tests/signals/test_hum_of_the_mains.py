@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.harmonics import hum
+from pzd.signals.harmonics import hum, hum_variance, mains_amplitudes
 
 RATE = 1000.0
 TIME = np.arange(8000) / RATE
@@ -49,3 +49,18 @@ def test_a_low_harmonic_of_the_motion_at_the_mains_frequency_is_no_hum(cycle: fl
     values = 5.0 * np.sin(2.0 * np.pi * order * cycle * TIME)
     assert not hum(TIME, values, ALL, cycle, 0.1).any()
     assert hum(TIME, values, ALL, 1.0, 0.1).any()
+
+
+def test_a_hum_in_step_with_a_motion_has_the_power_of_its_line_in_that_harmonic_alone() -> None:
+    cycle = TIME[:200]  # one of 5 Hz
+    harmonics = np.abs(np.fft.rfft(wave(50.0, 5.0)[: cycle.size]) / cycle.size) ** 2
+    found = hum_variance({(1, 50.0): 5.0, (3, 50.0): 1.5}, 5.0, 80, 5.0 / 40.0)
+    assert np.flatnonzero(found).tolist() == [10, 30]
+    np.testing.assert_allclose(found, harmonics[:81], atol=1e-20)
+
+
+def test_the_lines_of_the_mains_are_told_from_a_low_harmonic_of_the_motion(rng: np.random.Generator) -> None:
+    values = wave(50.0, 5.0) + rng.standard_normal(TIME.size)
+    found = mains_amplitudes(values, RATE, 1.0, 0.5)
+    assert found == {(1, 50.0): pytest.approx(5.0, rel=0.05), (3, 50.0): pytest.approx(1.5, rel=0.05)}
+    assert mains_amplitudes(values, RATE, 10.0, 0.5) == {(3, 50.0): pytest.approx(1.5, rel=0.05)}

@@ -419,7 +419,7 @@ def _from_cycles(
     # A cycle on fewer points than it has samples has lost as much of its noise.
     variance = error.sample_variance / len(counted) * points / error.points
     left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), variance)
-    floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.shared_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     slowest = max(row.C_Ns_per_m / row.k_N_per_m for row in given.damper.base)

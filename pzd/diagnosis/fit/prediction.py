@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import respond
+from pzd.damper.compose import jump_at_reversal, respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnosis.data import PreparedRecord
@@ -134,8 +134,9 @@ class PredictedForce:
     damper: Damper
     force: Array
     """(n,) [N]."""
-    displacement_variance: Array | float
-    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
+    shared_variance: Array | float
+    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by what all cycles share, the errors of the
+    displacement and mains in step with them [N^2]; 0 where none repeats."""
     timing: Array
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
     drawn: tuple[tuple[Record, Array], ...]
@@ -156,13 +157,16 @@ def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> Predicted
     if prepared.lead is None:
         drawn = tuple((draw, simulated_record(damper, draw)) for draw in prepared.draws[1:])
         return PredictedForce(damper, force, 0.0, timing, drawn)
-    return PredictedForce(damper, force, displacement_variance(damper, prepared), timing, ())
+    shared = displacement_variance(damper, prepared) + prepared.hum_variance
+    return PredictedForce(damper, force, shared, timing, ())
 
 
 def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = False) -> Array:
     """Return (n,) by how much the friction of a damper may be off beside a reversal that no sample resolves [N].
 
-    Equation: 2 T0 where the rod goes more than 2 T0/k within an interval, else 0
+    A seal beside the element turns at once, however finely the motion is sampled.
+
+    Equation: 2 T0 where the rod goes more than 2 T0/k within an interval, else 0; and the jump of the parallel forces
 
     Parameters
     ----------
@@ -170,11 +174,13 @@ def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = Fals
     displacement : (n,) cleaned [m]
     closed : whether the last sample is followed by the first
     """
-    friction = max(row.T0_N for row in damper.base)
-    if friction == 0.0:
-        return np.zeros(displacement.size)
     travel = max(2.0 * row.T0_N / row.k_N_per_m for row in damper.base)
-    return np.where(beside_unresolved_reversals(displacement, travel, closed=closed), 2.0 * friction, 0.0)
+    turns = (2.0 * max(row.T0_N for row in damper.base), travel), (jump_at_reversal(damper), 0.0)
+    off = np.zeros(displacement.size)
+    for force, until_turned in turns:
+        if force > 0.0:
+            off += force * beside_unresolved_reversals(displacement, until_turned, closed=closed)
+    return off
 
 
 def drawn_calm(given: PredictedForce, calm: Mask, counted: Mask) -> list[tuple[Record, Array]]:
