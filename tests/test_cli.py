@@ -793,6 +793,17 @@ def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
         "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), "
         "gas spring is likely (9% of the gap comes back without it); 6.1 % of peak has no name"
     )
+    added = {**support, "bouc_wen": support["rounded_yield"].model_copy(update={"share": 0.2, "added": True})}
+    assert diagnosis_lines(known.model_copy(update={"support": added}), Control())[0] == (
+        "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), "
+        "gas spring is likely (9% of the gap comes back without it); "
+        "bouc wen (20% of the gap comes back without it) predicts, whatever it stands for; 6.1 % of peak has no name"
+    )
+    alone = {name: added[name].model_copy(update={"added": True}) for name in ("rounded_yield", "gas_spring")}
+    assert diagnosis_lines(known.model_copy(update={"support": alone}), Control())[0] == (
+        "verdict: unexplained, but rounded yield (61% of the gap comes back without it) and gas spring (9% of the gap "
+        "comes back without it) predict, whatever they stand for; 6.1 % of peak has no name"
+    )
     bare = known.model_copy(update={"support": {}})
     assert diagnosis_lines(bare, Control())[0].startswith("verdict: unexplained, a gap that repeats")
 

@@ -155,6 +155,8 @@ class Support(Frozen):
     two tests that are held out as a whole."""
     sure: Literal["certain", "likely", "open"]
     """The same in a word."""
+    added: bool = False
+    """Whether it came in for its prediction alone: what it stands for is open, however sure the prediction is."""
 
 
 class Diagnosis(Frozen):

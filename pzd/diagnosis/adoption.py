@@ -54,6 +54,10 @@ class Adoption:
     alternatives: Mapping[str, str] = field(default_factory=dict)
     """Effects that would predict as well in the place of an adopted one, by its name."""
 
+    def is_added(self, effect: str) -> bool:
+        """Whether an effect was added for its prediction alone."""
+        return self.selection.reasons.get(effect) == ADDED
+
     def prediction(self, validation: CrossValidation) -> Prediction | None:
         """Return the prediction figures of diagnosis.json; None where no test could be held out."""
         return validation.prediction(self.baseline_error, self.error, self.interpolation_error)

@@ -44,7 +44,7 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
 
     errors = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
     return {
-        name: _support(own, error, before, validation, adoption.alternatives.get(name))
+        name: _support(own, error, before, validation, adoption.alternatives.get(name), added=adoption.is_added(name))
         for name, error in errors
         if error is not None
     }
@@ -56,6 +56,8 @@ def _support(
     plain: PredictionError,
     validation: CrossValidation,
     other: str | None,
+    *,
+    added: bool,
 ) -> Support:
     """Compare the errors of the tests with and without an effect; `other` would do as well in its place.
 
@@ -80,6 +82,7 @@ def _support(
         replaced_by=other,
         confidence=confidence,
         sure=_sureness(confidence),
+        added=added,
     )
 
 

@@ -75,14 +75,19 @@ def diagnosis_lines(
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in words: what is known of the parts first where the whole is unexplained."""
-    known = [
-        f"{name.replace('_', ' ')} is {each.sure} ({each.share:.0%} of the gap comes back without it)"
+    supported = [
+        (name.replace("_", " "), each, f"({each.share:.0%} of the gap comes back without it)")
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
         if each.sure != "open" and each.share >= _LEAST_SHARE
     ]
-    if diagnosis.verdict != "unexplained" or not known or diagnosis.left_of_peak is None:
+    known = ", ".join(f"{name} is {each.sure} {share}" for name, each, share in supported if not each.added)
+    useful = [f"{name} {share}" for name, each, share in supported if each.added]
+    if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
-    return f"but {', '.join(known)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
+    predict = "predicts, whatever it stands for" if len(useful) == 1 else "predict, whatever they stand for"
+    words = [known] if known else []
+    words += [f"{' and '.join(useful)} {predict}"] if useful else []
+    return f"but {'; '.join(words)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
 
 
 def _open_names(diagnosis: Diagnosis) -> str:

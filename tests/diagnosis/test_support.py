@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import TWO, campaign_of, damper_of, sines
 
-from pzd.diagnosis.adoption import Adoption
+from pzd.diagnosis.adoption import ADDED, Adoption
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
@@ -56,6 +58,16 @@ def test_what_another_could_replace_is_half_as_sure(validation: CrossValidation)
     assert found["gas_spring"].replaced_by == "accumulator"
     assert found["gas_spring"].confidence == pytest.approx(0.5, abs=0.01)
     assert found["gas_spring"].sure == "open"
+
+
+def test_what_was_added_for_its_prediction_alone_is_known_as_such(validation: CrossValidation) -> None:
+    """The tests show that the spring is needed, and not that it is one: what looks alike may predict as well."""
+    adoption = adoption_of(validation, **TRUE)
+    adoption = replace(adoption, selection=replace(adoption.selection, reasons={"gas_spring": ADDED}))
+    found = support_of(adoption, validation)
+    assert found["gas_spring"].added
+    assert found["gas_spring"].sure == "certain"
+    assert not found["preload_offset"].added
 
 
 def test_without_an_effect_there_is_nothing_to_support(validation: CrossValidation) -> None:

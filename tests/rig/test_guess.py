@@ -142,6 +142,26 @@ def test_a_letter_or_a_word_of_any_signal_is_what_its_unit_says(tmp_path: Path, 
     assert (entry.temperature_degC, entry.voltage_V) == (31.5, 0.5)
 
 
+@pytest.mark.parametrize(("header", "unit", "name"), [("Coil", "A", "current"), ("Valve", "V", "voltage")])
+def test_a_row_of_units_tells_the_control_signal_as_brackets_do(
+    tmp_path: Path, header: str, unit: str, name: str
+) -> None:
+    rows = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 0.5)]
+    path = stored(tmp_path / "a.csv", [f"Time,Stroke,Load,{header}", f"s,mm,N,{unit}"], rows, ",")
+    assert f"        {name}: {header}" in guessed([path])
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert entry.voltage_V == 0.5
+
+
+@pytest.mark.parametrize(("unit", "name"), [("A", "current"), ("V", "voltage")])
+def test_a_column_in_the_unit_of_a_control_signal_is_asked_about(tmp_path: Path, unit: str, name: str) -> None:
+    """A command may be that of the stand or of the damper; left out in silence, all its values pass for one."""
+    rows = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 0.5)]
+    path = stored(tmp_path / "a.csv", ["Time,Stroke,Load,Command", f"s,mm,N,{unit}"], rows, ",")
+    (asked,) = [line for line in guessed([path]) if line.startswith("# Is 'Command' the control signal?")]
+    assert f"columns: {{{name}: Command}}" in asked
+
+
 def test_a_farad_of_a_temperature_is_a_degree_fahrenheit(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 77.0)]
     path = stored(tmp_path / "a.csv", ["t [s],x [mm],F [N],Temp (F)"], columns, ",")

@@ -28,12 +28,14 @@ from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, own_quantity
 from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (
+    CONTROLS,
     Dialect,
     assigned,
     control_of,
     described,
     is_canonical,
     one_pattern,
+    quantity_of,
     setting_in_names,
     setting_of,
     unit_of,
@@ -449,7 +451,7 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
     lines.append(_REBOUND)
     if not any(entry.controlled for entry in entries):
-        lines += _WITHOUT_CAR
+        lines += [*_maybe_control(found), *_WITHOUT_CAR]
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
     settings = {setting for entry in entries for setting in entry.settings}
@@ -482,8 +484,30 @@ def _by_fit(
     return fitting, found
 
 
+def _maybe_control(files: Sequence[SniffedFile]) -> list[str]:
+    """Say which columns in volts or amperes were left out: tests at several of their values would pass for one."""
+    left = {
+        head: control
+        for file in files
+        for head in file.dialect.header
+        for control in CONTROLS
+        if quantity_of(head, below := file.unit_below(head), control) is None
+        and unit_of(head, below, own_quantity(VOLTAGE, control)) is not None
+    }
+    return [
+        f"# Is {head!r} the control signal? Then say columns: {{{control.name}: {written(head)}}}"
+        + (
+            "."
+            if control == Control()
+            else f", and at the top control: {{name: {control.name}, unit: {control.unit}}}."
+        )
+        for head, control in left.items()
+    ]
+
+
 def _control(files: Sequence[SniffedFile]) -> Control:
-    control = control_of([header for file in files for header in file.dialect.header])
+    signals = [control_of(file.dialect.header, file.dialect.units) for file in files]
+    control = next((signal for signal in signals if signal != Control()), Control())
     controlled = any(VOLTAGE in dict(file.columns) for file in files)
     if control == Control() and not controlled and value_in_names([file.path.stem for file in files], "current"):
         return Control("current", "A")
@@ -491,7 +515,7 @@ def _control(files: Sequence[SniffedFile]) -> Control:
 
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
-    columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
+    columns = assigned(dialect.header, dialect.units, control_of(dialect.header, dialect.units))
     file = SniffedFile(path, dialect, tuple(columns.items()), form)
     if dialect.headless:
         return replace(file, columns=tuple(_by_values(file).items()))

@@ -80,14 +80,15 @@ _DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | di
 """Spellings of degrees that pint does not know, or takes for coulombs and farads."""
 
 
-def control_of(headers: Sequence[str]) -> Control:
-    """Guess the control signal from the headers; a voltage where they show none."""
+def control_of(headers: Sequence[str], units: Sequence[str] | None) -> Control:
+    """Guess the control signal from the headers and the row of units; a voltage where they show none."""
+    below: Sequence[str | None] = units or [None] * len(headers)
     shown = [
         control
         for control, pattern in CONTROLS.items()
-        for header in headers
+        for header, unit in zip(headers, below, strict=True)
         if (re.search(pattern, _bare(header)) and quantity_of(header, None, Control()) not in (FORCE, DISPLACEMENT))
-        or _by_unit(header, None, control) is VOLTAGE
+        or _by_unit(header, unit, control) is VOLTAGE
     ]
     return next(iter(shown), Control())
 
@@ -303,7 +304,7 @@ def described(path: Path) -> tuple[Dialect, str]:
         sniffs = [Dialect(t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells)) for t in filled]
     if not sniffs:
         raise DataError(f"{at(path)}: {module.KIND} without a table of numbers below headers")
-    return max(sniffs, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))), form
+    return max(sniffs, key=lambda d: len(assigned(d.header, d.units, control_of(d.header, d.units)))), form
 
 
 def sniffed(path: Path) -> Dialect | None:
@@ -316,7 +317,7 @@ def sniffed(path: Path) -> Dialect | None:
     """
     raw = text_bytes(path)
     found = [dialect for encoding in _encodings(raw) if (dialect := _sniffed_as(raw, encoding)) is not None]
-    return max(found, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))) if found else None
+    return max(found, key=lambda d: len(assigned(d.header, d.units, control_of(d.header, d.units)))) if found else None
 
 
 def _sniffed_as(raw: bytes, encoding: str) -> Dialect | None:
@@ -337,7 +338,9 @@ def _sniffed_as(raw: bytes, encoding: str) -> Dialect | None:
 
 def _of_a_rig(dialect: Dialect) -> bool:
     """Whether the headers name displacement and force."""
-    return {DISPLACEMENT, FORCE} <= set(assigned(dialect.header, dialect.units, control_of(dialect.header)))
+    return {DISPLACEMENT, FORCE} <= set(
+        assigned(dialect.header, dialect.units, control_of(dialect.header, dialect.units))
+    )
 
 
 _WIDE_BLANKS = re.compile(r"\s{2,}|\t")
@@ -456,7 +459,7 @@ def _table(
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
-    if not assigned(found.header, named, control_of(found.header)):
+    if not assigned(found.header, named, control_of(found.header, named)):
         names = _names_further_up(rows, first, width)
         found = replace(found, header=names, units=None, skip=start, units_row=False, apart=True) if names else found
     return (len(alike), sum(numbers[n] for n in alike)), found
@@ -480,7 +483,7 @@ def _channels_in_units(names: Sequence[str], below: Sequence[str]) -> bool:
 def _names_further_up(rows: Sequence[Sequence[str]], first: int, width: int) -> tuple[str, ...] | None:
     """Return the names of the columns, with the units from a line below them, above other lines on each channel."""
     above = [n for n in range(max(first - _MOST_HEADS, 0), first) if len(rows[n]) == width]
-    top = next((n for n in above if len(assigned(rows[n], None, control_of(rows[n]))) >= _FEWEST_NAMED), None)
+    top = next((n for n in above if len(assigned(rows[n], None, control_of(rows[n], None))) >= _FEWEST_NAMED), None)
     if top is None:
         return None
     under = [n for n in above if n > top and all(_UNIT.fullmatch(cell) or not cell for cell in rows[n])]
