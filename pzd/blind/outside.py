@@ -1,6 +1,6 @@
 """Forces outside the library, each a formula of the motion, in parallel with the damper of the virtual rig.
 
-None of the fifteen effects that a verdict names has their shape (`rubber` is a `second_branch`, which none names):
+None of the eighteen effects that a verdict names has their shape (`rubber` is a `second_branch`, which none names):
 position enters the damping, or friction, or a force that does not rise with x, or the force changes from one cycle to
 the next without a temperature. Shapes that an effect of the library nearly has are left out, since to name that effect
 is no mistake: x^3 is nearly an end stop that begins early, v^3 a quadratic orifice, a chamber that fills late a lash.

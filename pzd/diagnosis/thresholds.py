@@ -83,6 +83,12 @@ TRIVIAL_SIZE = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, 
 Reason: twice the prior of a test's own offset and delay (`NuisanceConfig`): what is smaller may be the rig's."""
 NUISANCE_EFFECTS = frozenset(effect for effect, _ in TRIVIAL_SIZE)
 """Effects of which each test may have a little for itself."""
+SAME_FORCE = 1e-3
+"""Share of what an effect does to the residuals (sum of squares), below which the difference of another law with more
+parameters counts as none.
+
+Reason: 3 % as r.m.s.: a law comes so near another one in its limit alone. Where noise makes an effect of its own size
+uncertain, two laws that it does not tell apart differ by more. Not tuned."""
 END_STOP_BEGINS = 0.4
 """Share of the half stroke about its middle within which no end stop begins.
 

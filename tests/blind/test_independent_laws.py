@@ -32,6 +32,10 @@ IN_KERNEL: dict[str, dict[str, float]] = {
     "shear_thinning": {"n": 0.7},
     "second_branch": {"T0_2": 60.0, "k_2": 3e4},
     "stribeck_friction": {"F_s": 60.0, "v_s": 0.03},
+    "accumulator": {"F_g": 80.0, "L": 0.05},
+    "cavitation": {"d_c": -1.5e-3, "s_c": 5e-4},
+    "frame_compliance": {"d_f": 1e-3, "s_f": 5e-4},
+    "bouc_wen": {"F_h": 60.0, "x_h": 2e-3, "sigma": 1.5},
 }
 FORMS: dict[str, dict[str, float]] = {
     "frequency_dependent": {"bypass": 0.5, "bypass_lag": 0.1, "bypass_force": 400.0},
@@ -70,6 +74,7 @@ def test_a_law_outside_is_described_by_effects_of_the_library() -> None:
     described = {name: set(law.described_by) for name, law in OUTSIDE.items()}
     assert {effect for effects in described.values() for effect in effects} <= set(library())
     assert described["second_branch"] == {"second_branch"}
+    assert described["late_filling"] == {"lash", "cavitation"}
     assert described["thixotropy"] == set()
 
 

@@ -94,12 +94,21 @@ class Parameters(NamedTuple):
     duct: float = 0.0
     charge: float = 0.0
     column: float = 1.0
+    F_g: float = 0.0
+    L: float = 1.0
+    d_c: float = 0.0
+    s_c: float = 1.0
+    d_f: float = 0.0
+    s_f: float = 1.0
+    F_h: float = 0.0
+    x_h: float = 1.0
+    sigma: float = 0.5
 
 
 # States of the integration: flow [m], slip of the mount [m], low-passed force on the spool [N], structure of the fluid,
-# relaxed extension of the bushing [m].
-_FLOW, _MOUNT, _SPOOL, _STRUCTURE, _BUSHING = range(5)
-_STATES = 5
+# relaxed extension of the bushing [m], hysteretic variable of Bouc and Wen [-].
+_FLOW, _MOUNT, _SPOOL, _STRUCTURE, _BUSHING, _HYSTERESIS = range(6)
+_STATES = 6
 _CLOSE = 1e-10
 """Share of the force to which the flow is found: far below the 1e-5 that the longest step costs."""
 
@@ -184,13 +193,18 @@ def _flow(force: float, T0: float, C: float, p: Parameters) -> float:
 
 @compiled
 def _spring_force(deflection: float, k: float, p: Parameters) -> float:
-    """Return the force [N] of the oil spring."""
-    return k * (outside.late_extension(deflection, p.gap) if p.gap > 0.0 else laws.dead_zone(deflection, p.delta))
+    """Return the force [N] of the oil spring, behind a play, a pocket and a mount."""
+    e = outside.late_extension(deflection, p.gap) if p.gap > 0.0 else laws.dead_zone(deflection, p.delta)
+    if p.d_c != 0.0:
+        e = laws.spring_behind_pocket(e, p.d_c, p.s_c)
+    if p.d_f > 0.0:
+        e = laws.spring_behind_mount(e, p.d_f, p.s_f)
+    return k * e
 
 
 @compiled
 def _parallel_force(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
-    """Return the force [N] in parallel with the oil spring, but for the second branch, which has a memory."""
+    """Return the force [N] in parallel with the oil spring, but for branches, which have a memory."""
     force = (
         laws.end_stop_force(x, p.k_e, p.x_e)
         + laws.gas_spring_force(x, p.k_g)
@@ -198,12 +212,14 @@ def _parallel_force(x: float, v: float, a: float, relaxed: float, p: Parameters)
         + laws.preload_force(p.F_0)
     )
     force += laws.stribeck_force(v, p.F_s, p.v_s) + outside.bushing_force(x, relaxed, p.bushing_stiffness)
+    if p.F_g > 0.0:
+        force += laws.accumulator_force(x, p.F_g, p.L)
     return force + outside.cubic_force(x, p.cubic) + outside.gas_charge_force(x, p.charge, p.column)
 
 
 @compiled
 def _rates(
-    s: Array, x: float, t: float, T0: float, C: float, k: float, slipping: bool, p: Parameters, out: Array
+    s: Array, x: float, v: float, t: float, T0: float, C: float, k: float, slipping: bool, p: Parameters, out: Array
 ) -> None:
     """Compute the rates of the states into `out`."""
     force = _spring_force(x - s[_MOUNT] - s[_FLOW], k, p)
@@ -224,6 +240,7 @@ def _rates(
     out[_SPOOL] = outside.spool_rate(force, s[_SPOOL], p.bypass_lag)
     out[_STRUCTURE] = outside.structure_rate(s[_STRUCTURE], w, p.rebuilding, p.breakdown)
     out[_BUSHING] = outside.relaxation_rate(x, s[_BUSHING], p.bushing_time)
+    out[_HYSTERESIS] = outside.hysteresis_rate(s[_HYSTERESIS], v, p.x_h, p.sigma) if p.F_h > 0.0 else 0.0
 
 
 @compiled
@@ -244,18 +261,18 @@ def _march(
     for j in range(force.size):
         i = 2 * j
         spring = _spring_force(x[i] - s[_MOUNT] - s[_FLOW], k[i], p)
-        force[j] = spring + branch + _parallel_force(x[i], v[i], a[i], s[_BUSHING], p)
+        force[j] = spring + branch + p.F_h * s[_HYSTERESIS] + _parallel_force(x[i], v[i], a[i], s[_BUSHING], p)
         if j == force.size - 1:
             break
         h, m, e = time[i + 2] - time[i], i + 1, i + 2  # the step, its middle and its end
         slipping = outside.mount_slips(spring - p.mount_stiffness * s[_MOUNT], slipping, p.mount_holds, p.mount_slides)
-        _rates(s, x[i], time[i], T0[i], C[i], k[i], slipping, p, r1)
+        _rates(s, x[i], v[i], time[i], T0[i], C[i], k[i], slipping, p, r1)
         _moved(s, r1, 0.5 * h, moved)
-        _rates(moved, x[m], time[m], T0[m], C[m], k[m], slipping, p, r2)
+        _rates(moved, x[m], v[m], time[m], T0[m], C[m], k[m], slipping, p, r2)
         _moved(s, r2, 0.5 * h, moved)
-        _rates(moved, x[m], time[m], T0[m], C[m], k[m], slipping, p, r3)
+        _rates(moved, x[m], v[m], time[m], T0[m], C[m], k[m], slipping, p, r3)
         _moved(s, r3, h, moved)
-        _rates(moved, x[e], time[e], T0[e], C[e], k[e], slipping, p, r4)
+        _rates(moved, x[e], v[e], time[e], T0[e], C[e], k[e], slipping, p, r4)
         for n in range(s.size):
             s[n] += h / 6.0 * (r1[n] + 2.0 * r2[n] + 2.0 * r3[n] + r4[n])
         if p.T0_2 > 0.0:

@@ -149,6 +149,71 @@ def dead_zone(deflection: float, delta: float) -> float:
 
 LASH = Law("lash", lambda rng, scale, strength: {"delta": strength * 0.3 * scale.stroke})
 
+
+@compiled
+def squeezed(load: float, length: float, half: float) -> float:
+    """Return by how much [m] a cushion of some length [m] gives under a load >= 0, as an extension of the spring [m].
+
+    Equation: d s / (s + s_d): p V = const of a gas at a static pressure p A = k s_d            Source: Boyle 1662
+    """
+    return length * load / (load + half)
+
+
+@compiled
+def spring_behind_cushion(deflection: float, length: float, half: float) -> float:
+    """Return the extension s [m] of the spring where spring and cushion together are deflected by e >= 0 [m].
+
+    Method: Newton's, from the side on which it cannot overshoot: s + squeezed(s) is concave
+    """
+    s = deflection * half / (half + length)
+    for _ in range(60):
+        off = s + squeezed(s, length, half) - deflection
+        step = off / (1.0 + length * half / (s + half) ** 2)
+        s -= step
+        if abs(step) <= 1e-13 * deflection:
+            break
+    return s
+
+
+@compiled
+def spring_behind_pocket(deflection: float, d_c: float, s_c: float) -> float:
+    """Return what a pocket of gas in one chamber leaves of a deflection [m]: in rebound for d_c > 0.
+
+    Equation: x - y = e + d_c e / (e + s_c) on the side of the pocket
+    Source: Boyle's law; late filling as by Duym, Stiens and Reybrouck 1997, Vehicle System Dynamics 27
+    """
+    if d_c > 0.0 and deflection > 0.0:
+        return spring_behind_cushion(deflection, d_c, s_c)
+    if d_c < 0.0 and deflection < 0.0:
+        return -spring_behind_cushion(-deflection, -d_c, s_c)
+    return deflection
+
+
+def _draw_cavitation(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
+    pressed = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05)))) * scale.stroke
+    return {"d_c": either_side(rng) * strength * 0.3 * scale.stroke, "s_c": pressed}
+
+
+CAVITATION = Law("cavitation", _draw_cavitation)
+
+
+@compiled
+def spring_behind_mount(deflection: float, d_f: float, s_f: float) -> float:
+    """Return what a mount that hardens to either side leaves of a deflection [m].
+
+    Equation: x - y = e + d_f e / (|e| + s_f)       Source: Mindlin 1945, Bell System Technical Journal 24
+    """
+    s = spring_behind_cushion(abs(deflection), d_f, s_f)
+    return s if deflection > 0.0 else -s
+
+
+def _draw_frame_compliance(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
+    pressed = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05)))) * scale.stroke
+    return {"d_f": strength * 0.3 * scale.stroke, "s_f": pressed}
+
+
+FRAME_COMPLIANCE = Law("frame_compliance", _draw_frame_compliance)
+
 # --- Flow: the force against a flow speed w ---
 
 
@@ -306,6 +371,25 @@ def _draw_end_stop(rng: Generator, scale: Scale, strength: float) -> dict[str, f
 
 END_STOP = Law("end_stop", _draw_end_stop)
 
+GAS_EXPONENT = 1.3
+"""Of the polytropic compression: between 1, isothermal, and 1.4, adiabatic."""
+
+
+@compiled
+def accumulator_force(x: float, F_g: float, L: float) -> float:
+    """Return the force [N] of a gas that the rod compresses as it moves in, x from the middle of the stroke [m].
+
+    Equation: p V^1.3 = const, so F = -F_g (L / (L + x))^1.3        Source: polytropic gas; Dixon 2007
+    """
+    return -F_g * (L / (L + x)) ** GAS_EXPONENT
+
+
+def _draw_accumulator(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
+    return {"F_g": strength * scale.force, "L": float(rng.uniform(1.5, 6.0)) * scale.stroke}
+
+
+ACCUMULATOR = Law("accumulator", _draw_accumulator)
+
 # --- Sensor: what of the force is recorded ---
 
 
@@ -327,5 +411,6 @@ SENSOR_DELAY = Law("sensor_delay", _draw_sensor_delay, "sensor")
 LAWS = by_name(
     *(ASYMMETRY, END_STOP, FLUID_INERTIA, GAS_SPRING, LASH, ORIFICE_QUADRATIC, PIEZO_HYSTERESIS, PRELOAD_OFFSET),
     *(RELIEF_VALVE, ROUNDED_YIELD, SENSOR_DELAY, SHEAR_THINNING, STRIBECK_FRICTION, TEMPERATURE_DRIFT, VALVE_LAG),
+    *(ACCUMULATOR, CAVITATION, FRAME_COMPLIANCE),
 )
 """Every law that a verdict names."""

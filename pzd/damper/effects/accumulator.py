@@ -5,7 +5,9 @@ L = V_0/A; the force depends on this product and this quotient alone. Range: F_g
 Its nearest neighbour is `gas_spring`, with a `preload_offset`: to first order the same, F_0 = -F_g and
 k_g = 1.3 F_g/L, but as stiff everywhere. A wide slow test distinguishes them: the mean of rebound and compression is
 ((L + X)/(L - X))^2.3 times as steep at the inner end of a stroke +-X as at the outer one. The same mean distinguishes
-a `cubic_spring` or `end_stop`, which harden at both ends: there it is odd with respect to the middle.
+a `cubic_spring` or `end_stop`, which harden at both ends: there it is odd with respect to the middle. Where the stroke
+is too short to show the hardening, `gas_spring` and `preload_offset` are named, which are what it is there; behind a
+load cell that was zeroed it stands beside a `preload_offset`.
 """
 
 from __future__ import annotations
@@ -45,8 +47,6 @@ EFFECT = Effect(
         ({"x": 0.1, "F_g": 200.0, "L": 0.1}, -81.22523963562355),
     ),
     hidden=_hidden,
-    never_named="how often its name would be right has not been through a whole blind benchmark, in which a polytropic "
-    "gas counts as a gas_spring",
 )
 
 

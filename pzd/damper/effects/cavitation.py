@@ -6,7 +6,8 @@ faster than the gas pressure allows; d_c < 0 in compression, behind a foot valve
 pocket on the speed of the stroke before is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is
 `lash`, distinguished by a slow sine: free play loses the same travel after both reversals, so the loop is odd and has
 no even harmonics, wherever its zero lies; a pocket bends one flank alone. An `asymmetry` has even harmonics too, but
-unequal plateaus of steady slip; `frame_compliance` is distinguished as `lash` is.
+unequal plateaus of steady slip; `frame_compliance` is distinguished as `lash` is. A pocket that is squeezed at
+once is a `lash`, wherever its zero lies, and named so.
 """
 
 from __future__ import annotations
@@ -54,8 +55,6 @@ EFFECT = Effect(
     ),
     order=1,  # a free play is taken up before anything is squeezed
     hidden=_hidden,
-    never_named="how often its name would be right has not been through a whole blind benchmark, in which a chamber "
-    "that fills late counts as a lash",
 )
 
 

@@ -5,7 +5,8 @@ at most to either side. A linear frame is left out, for no test distinguishes it
 x - y = F/k + F/k_f, F = k k_f/(k + k_f) (x - y), at every voltage; where it carries the parallel forces as well, it
 belongs to the stand. Range: d_f 0.1-3 mm. Its nearest neighbours are `lash`, and a smaller k. A stroke so short that
 nothing slips distinguishes it from both: free play carries no force there, a linear spring is as stiff at twice the
-stroke, and this one hardens. `cavitation` hardens to one side alone.
+stroke, and this one hardens. `cavitation` hardens to one side alone. A mount that gives way at once is a `lash`, and
+named so.
 """
 
 from __future__ import annotations
@@ -47,7 +48,6 @@ EFFECT = Effect(
     ),
     order=2,  # behind a free play, and a pocket
     hidden=_hidden,
-    never_named="how often its name would be right has not been through a whole blind benchmark",
 )
 
 

@@ -33,8 +33,8 @@ EFFECT = Effect(
         ({"deflection": 2.0e-3, "travel": -5.0e-3, "T0_2": 100.0, "k_2": 5.0e4}, -2.0e-3),
         ({"deflection": 1.5e-3, "k_2": 5.0e4}, 75.0),
     ),
-    never_named="how often its name would be right has not been through a whole blind benchmark, in which the same law "
-    "(`rubber`) stands for what is outside the library",
+    never_named="whatever slips at a force of its own has its shelf: a lip, a rubber seat, the yield of a fluid or a "
+    "mount; which of these it stands for, the force does not show",
 )
 
 

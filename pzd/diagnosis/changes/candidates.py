@@ -67,6 +67,9 @@ STAND: Mapping[str, tuple[str, float]] = {
 """Unit and largest size of what the stand may have done to the force; the zero of the displacement moves no force."""
 NOT_HERE = ("sensor_delay", "temperature_drift")
 """Effects that are no change by themselves: one state's delay is in both, and a temperature is recorded."""
+IMITATORS = ("accumulator", "bouc_wen", "cavitation", "frame_compliance", "second_branch")
+"""Effects whose several numbers let them follow a part of any difference of two forces; beside them what no verdict
+names."""
 
 
 @dataclass(frozen=True)
@@ -331,7 +334,11 @@ def _absent(first: FirstState, name: str) -> Candidate:
         )
     )
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
-    return Candidate(name, "damper", tuple(coordinates), starts, True, bool(known_effect(name).never_named))
+    return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
+
+
+def _flexible(name: str) -> bool:
+    return name in IMITATORS or bool(known_effect(name).never_named)
 
 
 def _present(first: FirstState, name: str) -> list[Candidate]:
@@ -354,7 +361,7 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
             scale = p.search.scale(first.scales) or 1.0
             limits = (p.low - value) / scale, (p.high - value) / scale
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, value))
-    flexible = bool(known_effect(name).never_named)
+    flexible = _flexible(name)
     single = [Candidate(name, "damper", (c,), ((0.0,),), flexible=flexible) for c in (*coordinates, *added)]
     together = Candidate(name, "damper", tuple(coordinates), ((0.0,) * len(coordinates),), flexible=flexible)
     return [*single, together] if len(coordinates) > 1 else single

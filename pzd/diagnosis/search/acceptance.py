@@ -416,9 +416,24 @@ class SelectionStep:
 
 
 def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
-    """Return the other effects that explain a step as well as the chosen one, best first."""
-    others = [c for c in tried if c.effect != chosen.effect]
+    """Return the other effects that explain a step as well as the chosen one, best first.
+
+    A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
+    that gives way at once is a play, a gas that does not harden is an offset.
+    """
+    others = [c for c in tried if c.effect != chosen.effect and not _says_the_same(c, chosen)]
     return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)
+
+
+def _says_the_same(other: Candidate, chosen: Candidate) -> bool:
+    """Whether a law with more parameters gives the same force as the chosen one.
+
+    Equation: |r_other - r_chosen|^2 < s |r_chosen - r_without|^2
+    """
+    if other.fitted.optimum.size <= chosen.fitted.optimum.size or other.fitted.size != chosen.fitted.size:
+        return False
+    apart = np.concatenate(other.fitted.residuals) - np.concatenate(chosen.fitted.residuals)
+    return float(apart @ apart) < thresholds.SAME_FORCE * chosen.residual_change
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ def reweighted(
     """
     for _ in range(thresholds.MOST_REWEIGHTINGS if current.effects else 0):
         before, evidence = current, weigh(current.damper)
-        current = refit(evidence.whole, before.damper)
+        current = refit(evidence.whole, before.damper, thresholds.MOST_EVALUATIONS_OF_BEST)
         moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
         if np.all(moved <= thresholds.CONVERGED_CHANGE * standard_errors(current)):
             break
@@ -369,9 +369,13 @@ class _ForwardSelection:
             self._drop_needless(name, chosen.effect)
 
     def _reweight(self, found: FitResult) -> None:
-        """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap."""
+        """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap.
+
+        To its end, or a further effect would be paid for the rest of the way: where the force shows the length of a
+        pocket by its stiffness alone, one set of weights leaves a valley in which the next moves far.
+        """
         self.evidence = self.weigh(found.damper)
-        self.current = refit(self.evidence.whole, found.damper)
+        self.current = refit(self.evidence.whole, found.damper, thresholds.MOST_EVALUATIONS_OF_BEST)
         if self._widens_gap(self.current, found):
             self.current = refit(self.evidence.whole, found.damper, evaluations=1)
 

@@ -1,0 +1,70 @@
+"""Effects that look alike: the test that tells them apart does, and what says the same by more numbers is no rival."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sines
+
+from pzd.damper.effects import library
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.campaign import evidence_of
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.fit.least_squares import fit, refit, standard_errors
+from pzd.diagnosis.search.acceptance import rivals_of
+from pzd.diagnosis.search.candidates import candidate, converged
+from pzd.diagnosis.search.forward_selection import reweighted
+
+ONE_STROKE = ((0.5, 0.02), (2.0, 0.02))
+SEVERAL = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
+TOLD_APART: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
+    "accumulator": ({"F_g": 250.0, "L": 0.08}, ("gas_spring", "preload_offset", "end_stop")),
+    "cavitation": ({"d_c": 2e-3, "s_c": 1e-3}, ("lash", "asymmetry", "frame_compliance")),
+    "frame_compliance": ({"d_f": 2e-3, "s_f": 1e-3}, ("lash", "cavitation", "rounded_yield")),
+}
+
+
+@pytest.mark.parametrize("name", TOLD_APART)
+def test_tests_of_several_strokes_and_speeds_tell_an_effect_from_its_nearest_neighbours(
+    name: str, rng: np.random.Generator
+) -> None:
+    values, neighbours = TOLD_APART[name]
+    records = sines(damper_of(TWO, **{name: values}), rng, TWO, jitter=0.005, tests=SEVERAL, cycles=4, noise=5e-3)
+    told = diagnosed(records, forbid=all_but(name, *neighbours)).diagnosis
+    assert (told.verdict, told.effects) == ("named", (name,)), told.reason
+
+
+@pytest.mark.parametrize(
+    ("true", "values", "limit"),
+    [("gas_spring", {"k_g": 8000.0}, "second_branch"), ("lash", {"delta": 1e-3}, "frame_compliance")],
+)
+def test_a_law_that_gives_the_same_force_by_more_numbers_is_no_rival(
+    true: str, values: dict[str, float], limit: str, rng: np.random.Generator
+) -> None:
+    """A branch that just slips at the ends of the one stroke is a spring; a mount that gives way at once is a play."""
+    records = sines(damper_of(TWO, **{true: values}), rng, TWO, tests=ONE_STROKE)
+    whole = evidence_of(campaign_of(records), damper_of(TWO)).whole
+    before = fit(whole, (), whole.start())
+    chosen, other = (converged(whole, before, candidate(whole, before, library()[effect])) for effect in (true, limit))
+    assert chosen.delta_bic < other.delta_bic < 0.9 * chosen.delta_bic
+    lenient = DiagnoseConfig(rival_bic=-0.1 * chosen.delta_bic)
+    assert rivals_of(chosen, (chosen, other), lenient) == ()
+    assert rivals_of(other, (chosen, other), lenient) == (true,)
+
+
+def test_a_pocket_is_searched_to_the_end_of_its_valley_where_the_weights_change(rng: np.random.Generator) -> None:
+    """A stiff pocket shows d_c/s_c before either; nothing else is paid for the rest of the long way along."""
+    row = BaseRow(T0_N=263.0, C_Ns_per_m=1473.0, k_N_per_m=1.9e6, voltage_V=0.0)
+    truth = Damper(base=(row,), effects={"cavitation": {"d_c": 9.7e-4, "s_c": 9.4e-4}})
+    plain = Damper(base=(row,))
+    records = sines(truth, rng, (0.0,), tests=SEVERAL, noise=6e-3, colour=0.0)
+    weigh = partial(evidence_of, campaign_of(records))
+    evidence = weigh(plain)
+    before = refit(evidence.whole, plain.with_effect("cavitation", {"d_c": 0.03, "s_c": 0.033}), evaluations=1)
+    _, found = reweighted(weigh, evidence, before)
+    errors = standard_errors(found)
+    for parameter, error in zip(("d_c", "s_c"), errors, strict=True):
+        true = truth.effects["cavitation"][parameter]
+        assert abs(found.damper.effects["cavitation"][parameter] - true) < 3.5 * error < 0.5 * true
