@@ -89,6 +89,38 @@ def widening(disagree: Array, squares: float, freedom: int) -> Array:
     return np.maximum(disagree, max(1.0, squares / max(freedom, 1)))
 
 
+def by_what_was_left_out(slopes: Array, residual: Array, others: Array, sizes: Array) -> Array:
+    """Return the variance (p,) of estimates by one parameter more that was taken to be 0, of those the worst for each.
+
+    What was left out for being small is not nothing: the estimates take up what of it looks like theirs. That it is so
+    large and no larger is its prior, and the residual tells the rest.
+
+    Equation: max_o (b_o b_o) E[o^2], b_o = (J' J)^-1 J' j_o, E[o^2] = v + (v j' r)^2, v = 1 / (1/s_o^2 + j' j),
+    j what of j_o no estimate takes up                      Source: omitted variables; posterior of a normal prior
+
+    Parameters
+    ----------
+    slopes : (n, p) J of the estimates, in units of noise
+    residual : (n,) r
+    others : (n, o) of the parameters that were left out
+    sizes : (o,) their standard deviations s_o beforehand
+
+    Examples
+    --------
+    >>> one, other = np.array([[1.0], [0.0]]), np.array([[1.0], [1.0]])
+    >>> by_what_was_left_out(one, np.zeros(2), other, np.array([1.0]))
+    array([0.5])
+    """
+    taken = np.linalg.lstsq(slopes, others, rcond=SINGULAR)[0]
+    own = others - slopes @ taken
+    # At what two columns agree to by rounding, nothing of the other one is its own.
+    own = np.where(np.sum(own**2, axis=0) > SINGULAR * np.sum(others**2, axis=0), own, 0.0)
+    shown = np.sum(own**2, axis=0)
+    variance = np.asarray(sizes) ** 2 / (1.0 + np.asarray(sizes) ** 2 * shown)
+    second = variance + (variance * (residual @ own)) ** 2
+    return np.asarray(np.max(taken**2 * second, axis=1, initial=0.0))
+
+
 def student_quantile(freedom: Array | float, probability: float) -> Array:
     """Return below what Student's t lies with a probability; of less than one degree of freedom that of one.
 

@@ -53,6 +53,10 @@ ADDITIVE = ("fluid_inertia", "gas_spring", "orifice_quadratic", "preload_offset"
 """Laws of one size in proportion to which the force is."""
 SIZES = (0.005, 0.05)
 """Least and largest change of the force (r.m.s.), as a share of peak."""
+MULTIPLIES = {"C": ("aeration", "frequency_dependent", "position_grooves"), "T0": ("thixotropy",)}
+"""Laws outside the library that multiply C or T0: of a change of it the force shows a share."""
+SMALL = 0.01
+"""Relative change over which that share is differenced."""
 STAND = ("load_cell_zero", "load_cell_gain", "recorder_delay")
 
 
@@ -66,6 +70,8 @@ class Pair:
     """Factors of T0, C or k, parameters of a law that is newly there, or the stand's doing."""
     base: BinghamTable
     """T0, C and k of the first state."""
+    shown: Mapping[str, tuple[float, ...]]
+    """Share of each that the force shows where a law outside the library multiplies it, at every value of `base`."""
     outside: tuple[str, ...]
     equal: bool
 
@@ -116,7 +122,31 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
         by *= side * float(rng.uniform(0.3, 0.95))
         truth[name] = {name: by}
         after = tuple(_seen(r, name, by) for r in after)
-    return Pair(before, after, truth, base, outside, equal)
+    shown = {name: _shown(first, name, motions) for name in ELEMENT}
+    return Pair(before, after, truth, base, shown, outside, equal)
+
+
+def _shown(damper: case.HiddenDamper, name: str, motions: list[stand.Driven]) -> tuple[float, ...]:
+    """Return the share of a change of T0, C or k that the true force shows, at every value of the control signal.
+
+    Equation: s = sum dF dF_1 / sum dF_1^2, dF with the laws that multiply the quantity, dF_1 without
+    """
+    within = [law for law in damper.laws if law in MULTIPLIES.get(name, ())]
+    values = damper.base.values
+    if not within:
+        return (1.0,) * len(values)
+    row = tuple((1.0 + SMALL) * v for v in getattr(damper.base, name))
+    moved = replace(damper.base, **{name: row})
+    sums = np.zeros((2, len(values)))
+    for m in motions:
+        steady = m.time[::2] >= 0.0
+        with_laws, without = (
+            (replace(d, base=moved).force(m, None) - d.force(m, None))[steady]
+            for d in (damper, replace(damper, laws={k: v for k, v in damper.laws.items() if k not in within}))
+        )
+        at = int(np.argmin(np.abs(np.array(values) - np.median(m.signal))))
+        sums[:, at] += float(with_laws @ without), float(without @ without)
+    return tuple(float(v) for v in np.where(sums[1] > 0.0, sums[0] / np.where(sums[1] > 0.0, sums[1], 1.0), 1.0))
 
 
 def _changed(
@@ -193,7 +223,8 @@ def away(found: Changes, drawn: Pair) -> Iterator[tuple[str, float]]:
             continue
         start, to, low, high = (np.atleast_1d(np.array(v, dtype=float)) for v in (c.from_, c.to, c.low95, c.high95))
         if "factor" in given:
-            own = np.interp(c.at_voltage_V or (drawn.base.values[0],), drawn.base.values, getattr(drawn.base, c.name))
+            shown = np.array(getattr(drawn.base, c.name)) * drawn.shown[c.name]
+            own = np.interp(c.at_voltage_V or (drawn.base.values[0],), drawn.base.values, shown)
             true = _moved(c.name, start, own, given["factor"])
         elif c.parameter in given:
             before = np.nan_to_num(start)

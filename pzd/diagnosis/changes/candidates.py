@@ -386,7 +386,11 @@ class Response:
         Equation: D = (1 + g) exp(-i w tau) (F + R' - R) + F_z - F, F as recorded in the first state, R simulated
         """
         stand = {c.name: x * c.scale for c, x in zip(coordinates, values, strict=True) if c.of == "stand"}
-        moved = tuple((c, float(x)) for c, x in zip(coordinates, values, strict=True) if c.of == "damper")
+        moved = tuple(
+            (c, float(x))
+            for c, x in zip(coordinates, values, strict=True)
+            if c.of == "damper" and (x != 0.0 or (c.logarithmic and c.absent))
+        )
         found = []
         for comparison, change in zip(self.comparisons, self._changes(moved), strict=True):
             force = comparison.reference + change
@@ -397,7 +401,7 @@ class Response:
         return tuple(found)
 
     def _changes(self, moved: tuple[tuple[Coordinate, float], ...]) -> tuple[Complex, ...]:
-        if all(x == 0.0 and not (c.logarithmic and c.absent) for c, x in moved):
+        if not moved:
             return tuple(np.zeros_like(c.reference) for c in self.comparisons)
         if moved not in self._simulated:
             coordinates, values = [c for c, _ in moved], [x for _, x in moved]

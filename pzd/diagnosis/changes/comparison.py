@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal, cast
 
 import numpy as np
@@ -45,6 +44,7 @@ from pzd.diagnosis.changes.pairs import (
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
 from pzd.diagnosis.changes.state import State, about, diagnosed_state
+from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.fit.intervals import LEVEL
@@ -77,11 +77,6 @@ BEYOND_TESTED = 2.0
 """Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
 
 Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
-CROSS_STEP = 0.03
-"""Step of a coordinate of the first state over which the force of a change is differenced.
-
-Reason: such a force is often a percent of the whole, so that the tolerance of a simulation counts a hundred times as
-much as in a slope; a few percent are still a small step."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
@@ -521,14 +516,7 @@ class Findings:
     def _reported(self, best: Fitted) -> list[Change]:
         if not best.candidates:
             return []
-        covariance = self.search.regression.covariance(best)
-        slopes = self._slopes(best)
-        unnamed = self._hides(self.search.left(best), slopes)
-        # Of a coordinate that is a logarithm of the whole size, not of its change, the error is the share itself.
-        whole_sizes = np.array([c.logarithmic and c.absent for c in best.coordinates])
-        missed = self._missed_of_response(best, slopes) * np.where(whole_sizes, 1.0, best.values)
-        through = self._through_first_state(best)
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + missed**2 + unnamed**2 + through**2)
+        errors = Uncertainty(self.search, best).errors
         whole = float(np.mean([c.difference @ c.difference for c in self.comparisons]))
         found = []
         for candidate in best.candidates:
@@ -543,72 +531,6 @@ class Findings:
                 found.append(self._change(mine, share))
         unique = {(c.name, c.parameter): c for c in found}
         return list(unique.values())
-
-    def _slopes(self, best: Fitted) -> Array:
-        """Return (p,) the r.m.s. force by one unit of every coordinate, each test in units of its peak."""
-        columns = self.search.regression.columns(best.coordinates, best.values)
-        squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self.comparisons, strict=True)]
-        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
-
-    @staticmethod
-    def _hides(force: float, slopes: Array) -> Array:
-        """Return the (p,) standard error of coordinates by a force without a name: the whole of it may be theirs."""
-        return np.where(slopes > 0.0, force / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
-
-    def _missed_of_response(self, best: Fitted, slopes: Array) -> Array:
-        """Return (p,) the share to which it is not known how the force follows a coordinate.
-
-        A model that misses a share of the force knows this to that share. T0, C and k themselves are no better known
-        in the first state than what it misses there leaves open, and the force follows them in proportion.
-        """
-        share = self.search.regression.likelihood.known_discrepancy
-        force = [np.sum(stacked(c.reference) ** 2) / c.peak**2 for c in self.comparisons]
-        own = np.minimum(self._hides(share * float(np.sqrt(np.mean(force))), slopes), 1.0)
-        of_element = np.array([c.name in ELEMENT_COLUMNS for c in best.coordinates])
-        return np.where(of_element, np.maximum(own, share), share)
-
-    @cached_property
-    def _of_first_state(self) -> tuple[tuple[Coordinate, ...], Array]:
-        """Return the (m,) coordinates of the damper of the first state, and their (m, m) covariance.
-
-        They are known but for what the damper misses, all of which may lie in any one direction of them: two that do
-        nearly the same are each known as badly as the tests tell them apart. None is open by more than its own size.
-
-        Equation: (J' J / s^2 + 1)^-1, s = share |F| / 1.96, J the slopes; r.m.s. over the tests, in units of the peaks
-        """
-        known = {*ELEMENT_COLUMNS, *self.first.damper.effects}
-        single = [c for c in self.search.candidates if c.name in known and not (c.absent or c.per_voltage)]
-        own = tuple(c.coordinates[0] for c in single if len(c.coordinates) == 1)
-        columns = self.search.regression.columns(own, np.zeros(len(own)))
-        power = np.mean([c.T @ c / each.peak**2 for c, each in zip(columns, self.comparisons, strict=True)], axis=0)
-        force = np.mean([np.sum(stacked(c.reference) ** 2) / c.peak**2 for c in self.comparisons])
-        missed = self.search.regression.likelihood.known_discrepancy**2 * force / LEVEL**2
-        return own, missed * np.linalg.inv(power + missed * np.eye(len(own))) if missed > 0.0 else np.zeros_like(power)
-
-    def _through_first_state(self, best: Fitted) -> Array:
-        """Return the (p,) standard error of coordinates by what is not known of the damper in which they changed.
-
-        An exponent of C shows only in its product with C: one that was found too small makes the change too large.
-
-        Equation: dx = -(J' J)^-1 J' (d^2 F / dx dt) x dt, of the whitened differences; t of the first state
-        """
-        regression, own = self.search.regression, self._of_first_state[0]
-        moved = [(c, float(x)) for c, x in zip(best.coordinates, best.values, strict=True) if c.of == "damper"]
-        changed, values = [c for c, _ in moved], [x for _, x in moved]
-        keys = {(c.name, c.parameter) for c in changed}
-        whiteners = regression.likelihood.whiteners(best.scatter)
-        made = regression.response.of(changed, values)
-        cross = np.zeros((regression.likelihood.size, len(own)))
-        for j, c in enumerate(own):
-            if (c.name, c.parameter) in keys:  # its change is counted from it, so that it moves with it
-                continue
-            step = CROSS_STEP if c.high > CROSS_STEP else -CROSS_STEP
-            there = regression.response.of([c, *changed], [step, *values])
-            alone = regression.response.of([c], [step])
-            differences = [(t - a - m) / step for t, a, m in zip(there, alone, made, strict=True)]
-            cross[:, j] = np.concatenate([W @ d for W, d in zip(whiteners, differences, strict=True)])
-        slopes = np.linalg.pinv(regression.jacobian(best.coordinates, best.values, whiteners)) @ cross
-        return np.asarray(np.sqrt(np.sum((slopes @ self._of_first_state[1]) * slopes, axis=1)))
 
     def _change(self, mine: Sequence[tuple[Coordinate, float, float]], share: float) -> Change:
         c = mine[0][0]
@@ -720,34 +642,17 @@ class Findings:
 
     def _unchanged(self, best: Fitted) -> tuple[Unchanged, ...]:
         """List what would have shown a visible change, and has not changed visibly."""
-        regression = self.search.regression
-        whiteners = regression.likelihood.whiteners(best.scatter)
-        frame = np.zeros((regression.likelihood.size, 0))
-        if best.coordinates:
-            frame = np.linalg.qr(regression.jacobian(best.coordinates, best.values, whiteners)).Q
-        residual = np.concatenate([W @ r for W, r in zip(whiteners, best.residuals, strict=True)])
-        changed = {key for candidate in best.candidates for key in candidate.key}
+        known = Uncertainty(self.search, best)
         found: dict[tuple[str, str], Unchanged] = {}
-        for candidate in self.search.candidates:
-            if candidate.of == "stand" or candidate.per_voltage or len(candidate.coordinates) > 1:
+        for candidate in filter(known.tells, self.search.candidates):
+            if candidate.key[0] in found:
                 continue
             (c,) = candidate.coordinates
-            if candidate.key[0] in changed or candidate.key[0] in found or c.name == "temperature":
+            if_changed = known.if_changed(candidate)
+            most = self.diagnose.visible / if_changed.force if if_changed.force > 0.0 else np.inf
+            if most > SHOWN or LEVEL * if_changed.alone > most or abs(if_changed.value) > most:
                 continue
-            if candidate.absent and c.logarithmic:
-                continue
-            together = (*best.coordinates, c)
-            columns = [own[:, -1] for own in regression.columns(together, np.append(best.values, 0.0))]
-            own = np.concatenate([W @ column for W, column in zip(whiteners, columns, strict=True)])
-            own = own - frame @ (frame.T @ own)
-            force = np.sqrt(np.mean([col @ col / k.peak**2 for col, k in zip(columns, self.comparisons, strict=True)]))
-            if not own @ own > 0.0 or not force > 0.0:
-                continue
-            error, x = float(1.0 / np.sqrt(own @ own)), float(own @ residual / (own @ own))
-            most = self.diagnose.visible / float(force)
-            if most > SHOWN or LEVEL * error > most or abs(x) > most:
-                continue
-            at, start, to, low, high = self._values([(c, x, error)])
+            at, start, to, low, high = self._values([(c, if_changed.value, if_changed.error)])
             found[candidate.key[0]] = Unchanged(
                 name=c.name, parameter=c.parameter, unit=self.control.own_unit(c.unit), from_=start, to=to,
                 low95=low, high95=high, at_voltage_V=at,

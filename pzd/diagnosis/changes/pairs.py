@@ -327,7 +327,11 @@ def octave_mean(power: Array) -> Array:
 
 
 def displacement_variance(damper: Damper, test: AveragedTest, last: int) -> Array:
-    """Return (H + 1,) variance of the simulated force by the noise and resolution of the displacement [N^2]."""
+    """Return (H + 1,) variance of the simulated force by the noise and resolution of the displacement [N^2].
+
+    With the instants of jumps, which `pzd.diagnosis.fit.prediction` leaves out of its own: there samples beside a jump
+    do not count, while a harmonic has no samples that could be left out.
+    """
     draws = test.prepared.draws
     if len(draws) < 2:
         return np.zeros(last + 1)

@@ -266,6 +266,8 @@ class Regression:
 
     def columns(self, coordinates: Sequence[Coordinate], x: Array) -> list[Array]:
         """Compute for every comparison the (2 H + 1, p) derivatives of the difference by the coordinates [N]."""
+        if not coordinates:
+            return [np.zeros((c.difference.size, 0)) for c in self.comparisons]
         per_coordinate = []
         here = self.response.of(coordinates, x.tolist())
         for j, c in enumerate(coordinates):
@@ -274,15 +276,21 @@ class Regression:
             per_coordinate.append([(b - a) / width for a, b in zip(here, there, strict=True)])
         return [np.column_stack([each[i] for each in per_coordinate]) for i in range(len(self.comparisons))]
 
-    def covariance(self, fitted: Fitted) -> Array:
-        """Compute the (p, p) covariance of the coordinates, wider where the tests disagree by more than the scatter.
+    def covariance(self, columns: Sequence[Array], residuals: Sequence[Array], scatter: Scatter) -> Array:
+        """Compute the (p, p) covariance of coordinates, wider where the tests disagree by more than the scatter.
 
         Equation: (J' J)^-1 sqrt(w_i w_j), w as in `pzd.fit.intervals.widening`
+
+        Parameters
+        ----------
+        columns : (2 H + 1, p) derivatives of the difference of every comparison by the coordinates [N]
+        residuals : (2 H + 1,) what they leave [N]
+        scatter : with which they were fitted
         """
-        whiteners = self.likelihood.whiteners(fitted.scatter)
-        J = [W @ own for W, own in zip(whiteners, self.columns(fitted.coordinates, fitted.values), strict=True)]
-        r = [W @ each for W, each in zip(whiteners, fitted.residuals, strict=True)]
+        whiteners = self.likelihood.whiteners(scatter)
+        J = [W @ own for W, own in zip(whiteners, columns, strict=True)]
+        r = [W @ each for W, each in zip(whiteners, residuals, strict=True)]
         alone = covariance(np.concatenate(J))
-        squares, freedom = float(sum(each @ each for each in r)), self.likelihood.size - fitted.values.size
+        squares, freedom = float(sum(each @ each for each in r)), self.likelihood.size - alone.shape[0]
         spread = np.sqrt(widening(disagreement(J, r, alone), squares, freedom))
         return np.asarray(alone * np.outer(spread, spread))

@@ -194,7 +194,7 @@ class Search:
 
         Where it need only be possible it may be smaller.
         """
-        least = self._possible if possible else self._adoptable
+        least = self._possible if possible else self.adoptable
         promising = self._promising(before, self._tried(before), before.scatter)
         worth = [
             p
@@ -293,7 +293,7 @@ class Search:
                 less
                 for less, c in fewer
                 if best.bic - less.bic > self.adopt_bic
-                or self.size_of(best, c) < self._adoptable(best)
+                or self.size_of(best, c) < self.adoptable(best)
                 or not self._predicts(best, c)
                 or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
             ]
@@ -335,7 +335,7 @@ class Search:
         """Return the r.m.s. force from which something counts, each test in units of its peak."""
         return max(self.visible, self.hidden(fitted))
 
-    def _adoptable(self, fitted: Fitted) -> float:
+    def adoptable(self, fitted: Fitted) -> float:
         """Return the r.m.s. force from which a change is adopted, each test in units of its peak.
 
         What the model misses of others is seldom as much, nor what it misses of the tests that it stands for.

@@ -11,11 +11,14 @@ from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, names,
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
 from pzd.diagnosis.changes.comparison import Findings, Missed, changes_between, comparisons_of, findings_between
+from pzd.diagnosis.changes.regression import Fitted
 from pzd.diagnosis.changes.selection import _scaled
+from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
-from pzd.record import Record
+from pzd.record import Array, Record
 
 
 def findings(rng: np.random.Generator, before: Damper, after: Damper, scatter: float = 0.002) -> Findings:
@@ -26,6 +29,11 @@ def findings(rng: np.random.Generator, before: Damper, after: Damper, scatter: f
     return findings_between(*states, DiagnoseConfig(), IdentifyConfig(), Control())
 
 
+def through_first_state(found: Findings, fitted: Fitted) -> Array:
+    columns = found.search.regression.columns(fitted.coordinates, fitted.values)
+    return Uncertainty(found.search, fitted).through_first_state(columns)
+
+
 def test_an_exponent_of_the_viscous_force_is_as_open_as_the_damping_itself(rng: np.random.Generator) -> None:
     rows = (BaseRow(voltage_V=0.0, T0_N=0.3 * FORCE, C_Ns_per_m=0.7 * FORCE / SPEED, k_N_per_m=50.0 * FORCE / STROKE),)
     damper = Damper(base=rows)
@@ -33,15 +41,15 @@ def test_an_exponent_of_the_viscous_force_is_as_open_as_the_damping_itself(rng: 
     found = findings(rng, damper, damper.with_effect("shear_thinning", {"n": 0.85}))
     thinning = next(c for c in found.search.candidates if c.name == "shear_thinning")
     fitted = found.search.regression.fit((thinning,), np.array([-0.1]), found.best.scatter)
-    known, covariance = found._of_first_state
+    known, covariance = Uncertainty(found.search, fitted).of_first_state
     damping = [c.name for c in known].index("C")
     # C w_r ((w/w_r)^n - w/w_r) is in proportion to C, and to 1 - n as long as that is small
-    assert found._through_first_state(fitted)[0] == pytest.approx(
+    assert through_first_state(found, fitted)[0] == pytest.approx(
         abs(fitted.values[0]) * covariance[damping, damping] ** 0.5, rel=0.3
     )
     offset = next(c for c in found.search.candidates if c.name == "preload_offset")
     beside = found.search.regression.fit((offset,), np.array([0.1]), found.best.scatter)
-    assert found._through_first_state(beside)[0] < 1e-3 * abs(beside.values[0])
+    assert through_first_state(found, beside)[0] < 1e-3 * abs(beside.values[0])
 
 
 def test_a_branch_of_another_size_has_the_same_shape(rng: np.random.Generator) -> None:
@@ -151,3 +159,22 @@ def test_the_gas_of_an_accumulator_is_among_what_may_have_changed(rng: np.random
     damper = drawn_damper(rng, (0.0,))
     found = findings(rng, damper, damper.with_effect("accumulator", {"F_g": 60.0, "L": 3.0 * STROKE}))
     assert "accumulator" in names_told(found.changes())
+
+
+def test_what_has_no_name_leaves_open_what_did_not_change_and_so_does_what_was_too_small(
+    rng: np.random.Generator,
+) -> None:
+    """All that is left may be of C; and T0 may have changed by what nobody sees, which looks like C."""
+    damper = drawn_damper(rng, (0.0,))
+    found = findings(rng, damper, damper)
+    nothing = found.search.nothing()
+    (damping,) = [c for c in found.search.candidates if c.name == "C"]
+    quiet = Uncertainty(found.search, nothing).if_changed(damping)
+    assert quiet.error > quiet.alone
+    third = [
+        0.01 * c.peak * (np.arange(r.size) == 3) for c, r in zip(found.comparisons, nothing.residuals, strict=True)
+    ]
+    left = replace(nothing, residuals=tuple(r + t for r, t in zip(nothing.residuals, third, strict=True)))
+    loud = Uncertainty(found.search, left).if_changed(damping)
+    assert loud.alone * loud.force > 0.9 * 0.01 / LEVEL
+    assert loud.alone > quiet.alone
