@@ -381,7 +381,7 @@ def accumulator_force(x: float, F_g: float, L: float) -> float:
 
     Equation: p V^1.3 = const, so F = -F_g (L / (L + x))^1.3        Source: polytropic gas; Dixon 2007
     """
-    return -F_g * (L / (L + x)) ** GAS_EXPONENT
+    return float(-F_g * (L / (L + x)) ** GAS_EXPONENT)
 
 
 def _draw_accumulator(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
