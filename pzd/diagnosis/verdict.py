@@ -166,7 +166,9 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
     if chance < config.significance and size >= config.visible:
         alone = f"probability by noise alone {max(chance, 1e-300):.1g}"
-        return Decision("unexplained", f"{gap} that repeats ({alone}); no effect of the library fits", None)
+        return Decision(
+            "unexplained", f"{gap} that repeats ({alone}); no effect of the library is supported by itself", None
+        )
     possible = tuple(dict.fromkeys((*selection.undecided, *_likelier_alternatives(selection, config))))
     if possible:
         words = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
