@@ -1,8 +1,8 @@
 """Cross-validation: prediction of whole tests, and of whole voltages, that were held out of the fit.
 
 The tests are assigned to folds; the damper is refitted without each fold and predicts the tests in it. Nothing is
-fitted to a held-out test, its own offset, gain and delay included. A test that is alone at its voltage is divided into
-halves, for without it nothing would be known there; that is weak evidence.
+fitted to a held-out test, its own offset, gain and delay included. A test that is alone at its voltage, or alone shows
+T0 and C there, is divided into halves, for without it nothing would be known of these; that is weak evidence.
 """
 
 from __future__ import annotations
@@ -34,13 +34,14 @@ from pzd.fit.cross_validation import (
     squared_sums,
 )
 from pzd.record import Array, Mask
+from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns, nuisance_forces
 
 # --- Folds: each test is held out once
 
 
 PARTS = 2
-"""Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
+"""Halves of a lone test: the first predicts the second, and the second the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,12 @@ class Folds:
     """Voltage of each group [V], 0 for a damper without a control signal; None where it moves."""
     folds: tuple[tuple[Mask, ...], ...]
     """Held-out samples of each fold, one mask (n,) per record."""
+    lone: frozenset[int]
+    """Records that are alone at their voltage, or alone slip there: each half is predicted by the other.
+
+    It has the offset, gain and delay of the other, which T0, C and k of that voltage absorb and an effect shared by all
+    voltages does not: what these may contribute within their priors says nothing.
+    """
 
     @cached_property
     def no_samples(self) -> tuple[Mask, ...]:
@@ -63,7 +70,8 @@ class Folds:
 def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     """Assign the tests of each voltage to folds in turn, so that each fold holds out some tests of each voltage.
 
-    In the order of their names: whichever way the files are listed, and the tests of another state alike.
+    Those that slip in turn, and those that do not: T0 and C are known from tests that slip, and some are left beside
+    each fold. In the order of their names: whichever way the files are listed, and the tests of another state alike.
 
     Parameters
     ----------
@@ -79,14 +87,34 @@ def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     voltages = tuple(None if node < 0 else nodes[node] for node in members)
     sizes = [p.record.time.size for p in prepared]
     folds = tuple(tuple(np.zeros(n, dtype=np.bool_) for n in sizes) for _ in range(FOLDS))
-    for turn, group in enumerate(groups):
-        if len(group) > 1:
-            for i, fold in zip(group, folds_in_turn(len(group), turn), strict=True):
+    lone = set[int]()
+    for turn, (group, voltage) in enumerate(zip(groups, voltages, strict=True)):
+        several = len(group) > 1 and voltage is not None
+        slipping = [i for i in group if several and _slips(prepared[i], baseline)] or [*group]
+        dealt = [slipping, [i for i in group if i not in slipping]]
+        if len(slipping) == 1:
+            lone.update(slipping)
+            for part, mask in enumerate(_halves(prepared[slipping[0]])):
+                folds[(turn + part) % FOLDS][slipping[0]][:] = mask
+            dealt = dealt[1:]
+        for tests in dealt:
+            for i, fold in zip(tests, folds_in_turn(len(tests), turn), strict=True):
                 folds[fold][i][:] = True
-        else:
-            for part, mask in enumerate(_halves(prepared[group[0]])):
-                folds[(turn + part) % FOLDS][group[0]][:] = mask
-    return Folds(groups, voltages, tuple(fold for fold in folds if any(mask.any() for mask in fold)))
+    kept = tuple(fold for fold in folds if any(mask.any() for mask in fold))
+    return Folds(groups, voltages, kept, frozenset(lone))
+
+
+def _slips(prepared: PreparedRecord, damper: Damper) -> bool:
+    """Whether a test shows T0 and C: a larger T0 and C change its force. Where nothing slips, k alone makes the force.
+
+    Equation: rms(F((1 + s) T0, (1 + s) C) - F(T0, C)) >= d max abs(F)
+    """
+    more = 1.0 + thresholds.MORE_RESISTANCE
+    scaled = ({"T0_N": more * row.T0_N, "C_Ns_per_m": more * row.C_Ns_per_m} for row in damper.base)
+    base = tuple(row.model_copy(update=values) for row, values in zip(damper.base, scaled, strict=True))
+    resisting = damper.model_copy(update={"base": base})
+    force, stronger = (predicted_force(each, prepared) for each in (damper, resisting))
+    return rms(stronger - force) >= thresholds.RESISTANCE_SHOWN * float(np.max(np.abs(force)))
 
 
 def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
@@ -306,8 +334,8 @@ class CrossValidation(Folds):
 
     def _hold_out(self) -> HoldOut:
         """Return what the folds hold out: whole tests, or parts of tests that are alone at their voltage."""
-        kinds: set[HoldOut] = {"tests"} if any(len(group) > 1 for group in self.groups) else set()
-        for i in self._lone_tests:
+        kinds: set[HoldOut] = {"tests"} if any(i not in self.lone for group in self.groups for i in group) else set()
+        for i in self.lone:
             kinds.add("segments" if self.campaign.prepared[i].cycles is None else "cycles")
         return kinds.pop() if len(kinds) == 1 else "mixed"
 
@@ -343,15 +371,6 @@ class CrossValidation(Folds):
         }
         return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(held_out)]
 
-    @property
-    def _lone_tests(self) -> frozenset[int]:
-        """Tests that are alone at their voltage.
-
-        Either half has the offset, gain and delay of the other, which T0, C and k of that voltage absorb and an effect
-        shared by all voltages does not: what these may contribute within their priors says nothing.
-        """
-        return frozenset(group[0] for group in self.groups if len(group) == 1)
-
     def _error_of_fold(self, damper: Damper | None, held_out: Sequence[Mask]) -> PredictionError:
         """Compute the error of a refitted damper on the held-out samples; empty where there is no damper."""
         records, entries = list[int](), list[tuple[float, ...]]()
@@ -364,7 +383,7 @@ class CrossValidation(Folds):
             force = p.record.force[kept]
             residual = force - predicted_force(damper, p)[kept]
             negligible = residual.size * (self.visible * float(np.max(np.abs(p.record.force)))) ** 2
-            if i in self._lone_tests:
+            if i in self.lone:
                 negligible += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
             entries.append((*squared_sums(force, residual), negligible, self._beyond_own(p, residual, kept)))
@@ -486,4 +505,4 @@ def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) ->
     everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
     whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.budget)
     folds = assign_folds(prepared, baseline)
-    return CrossValidation(folds.groups, folds.voltages, folds.folds, whole, baseline, visible)
+    return CrossValidation(folds.groups, folds.voltages, folds.folds, folds.lone, whole, baseline, visible)

@@ -149,6 +149,18 @@ CANCELLED_SHARE = 0.1
 
 Reason: an error of a tenth in either is then as large as what both do together; not tuned."""
 
+# --- Which tests are held out together (cross_validation.py)
+
+MORE_RESISTANCE = 0.1
+"""Share by which T0 and C are raised to see whether a test shows them.
+
+Reason: a test that is pulled harder than T0 by less hardly tells it; not tuned."""
+RESISTANCE_SHOWN = 0.0025
+"""Change of the force by that, as a share of peak (r.m.s.), from which a test shows T0 and C.
+
+Reason: the default of `visible`; a test that slips all the way changes by twenty times as much, one that does not by
+nothing."""
+
 # --- When an effect is added for its prediction alone (predictive_search.py)
 
 LEAST_PREDICTION_GAIN = 0.05

@@ -166,7 +166,9 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
     if chance < config.significance and size >= config.visible:
         alone = f"probability by noise alone {max(chance, 1e-300):.1g}"
-        return Decision("unexplained", f"{gap} that repeats ({alone}); no effect of the library fits", None)
+        return Decision(
+            "unexplained", f"{gap} that repeats ({alone}); no effect of the library is supported by itself", None
+        )
     possible = tuple(dict.fromkeys((*selection.undecided, *_likelier_alternatives(selection, config))))
     if possible:
         words = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
@@ -308,7 +310,7 @@ class NuisanceTrend:
     nuisance: str
     follows: str
     size: float
-    """R.m.s. of the force that it contributes, as a share of peak."""
+    """R.m.s. of the force that it contributes to the tests beyond one value for all, as a share of peak."""
     probability: float
     """Of such a trend by chance alone, corrected for all pairs that were tried."""
 
@@ -323,7 +325,11 @@ class NuisanceTrend:
 def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -> NuisanceTrend | None:
     """Return the most significant trend of the tests' nuisances over their motion; None where chance explains all.
 
-    Equation: t = b / sqrt(sum e^2 / (n - g - 1) / sum x^2), y = b x + e about the means in each of g conditions
+    Its size is that of the force which it contributes to the very tests: a late clock hardly moves the force of a slow
+    test, and is the less known for it.
+
+    Equation: t = b / sqrt(sum e^2 / (n - g - 1) / sum x^2), y = b x + e about the means in each of g conditions;
+    size^2 = min_c sum (f (b x - c))^2 / n, f the force of one unit in each test, c one value a condition
                                                             Source: least squares; Bonferroni over the pairs
 
     Parameters
@@ -336,15 +342,15 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
     if not checks:
         return None
     condition = np.array([nearest_row(damper.base, c.prepared) for c in checks])
-    nuisances, sizes = _test_nuisances(checks)
+    nuisances, forces = _test_nuisances(checks)
     pairs = [
-        (name, follows, _within_condition_trend(nuisances[:, i], over, condition), sizes[i])
+        (name, follows, _within_condition_trend(nuisances[:, i], forces[:, i], over, condition))
         for i, name in enumerate(NUISANCE_NAMES)
         for follows, over in _motion_quantities(checks)
     ]
     found = [
-        NuisanceTrend(name, follows, trend[0] * size, min(1.0, len(pairs) * trend[1]))
-        for name, follows, trend, size in pairs
+        NuisanceTrend(name, follows, trend[0], min(1.0, len(pairs) * trend[1]))
+        for name, follows, trend in pairs
         if trend is not None
     ]
     visible = thresholds.LARGE_REMAINDER * config.visible
@@ -353,14 +359,14 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
 
 
 def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
-    """Estimate (n, 3) offset, gain, delay of every test in `NUISANCE_UNITS`, and (3,) force of one unit [peak]."""
-    found, size = [], []
+    """Estimate (n, 3) offset, gain, delay of every test in `NUISANCE_UNITS`, and (n, 3) force of one unit [peak]."""
+    found, forces = [], []
     for check in checks:
         force = check.predicted[check.wanted]
         columns = nuisance_columns(force, check.prepared.record.rate, NUISANCE_UNITS, check.wanted)
         found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
-        size.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
-    return np.array(found).reshape(-1, 3), np.mean(np.array(size).reshape(-1, 3), axis=0)
+        forces.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
+    return np.array(found).reshape(-1, 3), np.array(forces).reshape(-1, 3)
 
 
 def _motion_quantities(checks: Sequence[ResidualCheck]) -> Iterator[tuple[str, Array]]:
@@ -374,12 +380,22 @@ def _motion_quantities(checks: Sequence[ResidualCheck]) -> Iterator[tuple[str, A
     yield "temperature", np.array([np.nan if t is None else t for t in temperatures])
 
 
-def _within_condition_trend(values: Array, over: Array, condition: NDArray[np.int64]) -> tuple[float, float] | None:
-    """Compute the r.m.s. of a trend within conditions and its probability by chance; None with too few tests."""
+def _within_condition_trend(
+    values: Array, forces: Array, over: Array, condition: NDArray[np.int64]
+) -> tuple[float, float] | None:
+    """Compute the r.m.s. force of a trend within conditions and its probability by chance; None with too few tests.
+
+    Parameters
+    ----------
+    values : (n,) of a nuisance
+    forces : (n,) r.m.s. force of one unit of it in each test
+    over : (n,) that it may follow, NaN where a test has none
+    condition : (n,) base row of each test
+    """
     from scipy.special import stdtr
 
     known = np.isfinite(over)
-    y, x, condition = values[known], over[known], condition[known]
+    y, x, condition, unit = values[known], over[known], condition[known], forces[known]
     free = y.size - np.unique(condition).size - 1
     if free < thresholds.FEWEST_FOR_A_TREND:
         return None
@@ -391,7 +407,12 @@ def _within_condition_trend(values: Array, over: Array, condition: NDArray[np.in
         return None
     slope = float(x @ y / (x @ x))
     left = float(np.sum((y - slope * x) ** 2)) / free
-    size = abs(slope) * rms(x)
+    contributed = slope * x
+    for each in np.unique(condition):
+        inside = condition == each
+        if np.any(unit[inside]):
+            contributed[inside] -= np.average(contributed[inside], weights=unit[inside] ** 2)
+    size = rms(unit * contributed)
     if left <= 0.0:
         return size, 0.0 if slope else 1.0
     return size, float(2.0 * stdtr(free, -abs(slope) * np.sqrt(float(x @ x) / left)))

@@ -122,6 +122,21 @@ def test_a_test_alone_at_its_voltage_holds_out_its_cycles(
     assert len(found.by) == len(records)
 
 
+def test_the_one_test_that_slips_is_not_foretold_by_those_that_only_strain_the_oil_spring(
+    rng: np.random.Generator,
+) -> None:
+    """At 150 V three tests of four do not reach T0: without the fourth it may be anything beyond their force."""
+    plain = damper_of((0.0, 150.0))
+    tests = ((0.5, 0.0025), (1.0, 0.0025), (2.0, 0.0029), (1.0, 0.01))
+    asked = validation(sines(plain, rng, (0.0, 150.0), tests=tests, cycles=4), plain)
+    *_, slipping = (i for i, p in enumerate(asked.campaign.prepared) if "150V" in p.record.name)
+    assert asked.lone == {slipping}
+    for each in asked.folds:
+        assert not each[slipping].all()
+    # Those of 0 V all slip: each is held out as a whole.
+    assert sum(fold[i].all() for fold in asked.folds for i in range(len(tests))) == len(tests)
+
+
 def test_too_little_to_hold_a_test_out_is_reported(rng: np.random.Generator) -> None:
     damper = damper_of((0.0,))
     asked = validation((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)

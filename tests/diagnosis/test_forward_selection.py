@@ -52,6 +52,16 @@ def test_two_effects_that_distort_each_other_are_found(rng: np.random.Generator)
     assert set(told.effects) == {"orifice_quadratic", "rounded_yield"}, told.reason
 
 
+def test_an_asymmetry_is_found_beside_the_zero_that_bends_it_in_slow_tests(rng: np.random.Generator) -> None:
+    """C alone is larger in rebound; with the zero of a load cell the offset is a fifth of the slowest force."""
+    base = BaseRow(voltage_V=0.0, T0_N=25.0, C_Ns_per_m=900.0, k_N_per_m=4e5)
+    truth = Damper(base=(base,), effects={"asymmetry": {"alpha": 0.3}, "preload_offset": {"F_0": -7.5 - 8.0}})
+    tests = [(v / (2.0 * np.pi * 0.025), 0.025) for v in (0.052, 0.131, 0.262, 0.393, 0.524, 1.047)]
+    records = sines(truth, rng, (0.0,), tests=tests, noise=0.004, colour=0.0, cycles=6)
+    found = diagnosed(records, forbid=all_but("asymmetry", "preload_offset")).diagnosis
+    assert (found.verdict, {*found.effects}) == ("named", {"asymmetry", "preload_offset"})
+
+
 def test_an_effect_that_stood_in_for_another_is_begun_afresh_beside_it(rng: np.random.Generator) -> None:
     """Alone the friction falls over the whole range of speeds, as a power law does; from there no way leads to both."""
     rows = zip(TWO, (210.0, 450.0), (3600.0, 2900.0), (1.7e6, 2e6), strict=True)

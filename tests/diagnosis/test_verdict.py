@@ -243,6 +243,14 @@ def test_gains_and_offsets_that_scatter_are_no_trend(rng: np.random.Generator, j
         assert trend(tuple(moved)) is None
 
 
+def test_a_late_clock_of_a_test_too_slow_to_show_it_is_no_trend(rng: np.random.Generator) -> None:
+    """A gas test of a minute and more beside tests of one stroke: 4 ms hardly move its force, as they would theirs."""
+    fast = [sine(damper_of((0.0,)), 0.0, f, 0.02, rng, noise=2e-3) for f in (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)]
+    slow = sine(damper_of((0.0,)), 0.0, 0.02, 0.025, rng, noise=2e-3, cycles=2, rate=500.0)
+    late = replace(slow, force=np.roll(slow.force, 2))
+    assert trend((*fast, late)) is None
+
+
 def test_two_tests_a_voltage_show_no_trend(rng: np.random.Generator) -> None:
     records = [r for r in frequency_dependent(rng, 0.05) if "30mm" in r.name]
     assert trend(tuple(records)) is None

@@ -326,10 +326,15 @@ class _ForwardSelection:
         return acceptance.leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
-        """Adopt two effects at once: alone either takes on values that the other distorts."""
+        """Adopt two effects at once: alone either takes on values that the other distorts.
+
+        Where all that are large enough leave the gap alone, or widen it, the best of these leads: an asymmetry that a
+        zero of the load cell bends widens the gap of slow tests. Both together have to close it.
+        """
         missing = self.evidence.gap_is_significant(self.current, self.config)
         leads = (c for c in tried if missing and self._reason_against(self.evidence, self.current, c) is None)
-        lead = next(leads, None)
+        large = (c for c in tried if missing and not acceptance.insufficient_support(self.evidence, self.config, c))
+        lead = next(leads, None) or next(large, None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
             self.open_detections = acceptance.detections(self.evidence.whole, self.current, tried)
