@@ -119,6 +119,24 @@ def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_num
     assert names(found.changes()) == ["C"]
 
 
+def test_a_valve_that_opens_between_two_starts_of_the_search_promises_what_it_explains(
+    rng: np.random.Generator,
+) -> None:
+    """Its force is no straight line in where it opens, so that from 30 % off it would explain nothing."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.1 * FORCE, C_Ns_per_m=0.9 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
+    damper = Damper(base=(row,))
+    opened = damper.with_effect("relief_valve", {"F_r": 0.4 * FORCE, "C_r": 0.65 * row.C_Ns_per_m})
+    search = findings(rng, damper, opened).search
+    nothing = search.nothing()
+    (valve,) = [c for c in search.candidates if c.name == "relief_valve"]
+    size = search.regression.likelihood.size
+    (promise,) = search._promising(nothing, [valve], nothing.scatter)
+    whitened = [
+        W @ r for W, r in zip(search.regression.likelihood.whiteners(nothing.scatter), nothing.residuals, strict=True)
+    ]
+    assert promise.criterion - 2.0 * np.log(size) < 0.3 * sum(float(r @ r) for r in whitened)
+
+
 def outside(damper: Damper, rng: np.random.Generator, motions: tuple[tuple[float, float], ...]) -> list[Record]:
     """Tests of a damper with a law beside it that is not in the library, of a tenth of the peak."""
     records = campaign(damper, rng, motions)
