@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, names, names_told, state_of
+from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, found, inside, names, names_told, state_of
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
@@ -135,6 +135,25 @@ def test_a_valve_that_opens_between_two_starts_of_the_search_promises_what_it_ex
         W @ r for W, r in zip(search.regression.likelihood.whiteners(nothing.scatter), nothing.residuals, strict=True)
     ]
     assert promise.criterion - 2.0 * np.log(size) < 0.3 * sum(float(r @ r) for r in whitened)
+
+
+def bypassed(damping: float, rng: np.random.Generator) -> tuple[Record, ...]:
+    """Tests of a damper with a groove: less of C about the middle of the stroke, which no law of the library has."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.045 * FORCE, C_Ns_per_m=damping, k_N_per_m=100.0 * FORCE / STROKE)
+    motions = [(f, 0.025) for f in (0.33, 0.65, 1.0, 1.3, 1.9, 2.6)] + [(3.0, 0.01), (5.0, 0.005)]
+    tests = campaign(Damper(base=(row,)), rng, motions, noise=0.005)
+    less = [0.36 * damping * np.exp(-((r.displacement / 0.01) ** 2)) * r.velocity for r in tests]
+    return tuple(replace(r, force=r.force - f) for r, f in zip(tests, less, strict=True))
+
+
+def test_a_tenth_less_of_a_damping_that_the_model_knows_in_part_is_no_new_valve(rng: np.random.Generator) -> None:
+    """The tenth of what the model misses has the shape of no candidate, and a valve would take it up."""
+    for draw in rng.spawn(2):
+        changes = found(bypassed(FORCE / SPEED, draw), bypassed(0.9 * FORCE / SPEED, draw))
+        assert set(names(changes)) <= {"C"}
+        assert "C" in names_told(changes)
+        for change in changes.changes:
+            assert inside(change, 0.9)
 
 
 def outside(damper: Damper, rng: np.random.Generator, motions: tuple[tuple[float, float], ...]) -> list[Record]:
