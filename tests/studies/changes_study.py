@@ -13,6 +13,11 @@ truth, not all of it), silent, or wrong, and how many intervals of `to` hold the
 intervals, for equal and unlike motions apart. The line tells how far `to` lies from the true change, in half intervals.
 With `--log` what comes of each pair is added to a file, and the summary counts all that the file holds, so that a long
 study may run in pieces.
+
+A second count holds to what shows: of what changed, that which leaves 0.5 % of peak beside the other change and beside
+what any two tests of one damper on this stand differ by, an offset, a gain and a delay of each. What leaves less may be
+named or not. Dampers whose force is not settled, so that C larger by a billionth makes another one, are not drawn: the
+steps of the generator's solver chatter where a valve is all but flat.
 """
 
 from __future__ import annotations
@@ -22,7 +27,7 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -40,6 +45,7 @@ from pzd.damper.effects import library
 from pzd.diagnosis.changes.comparison import changes_between, changes_between_rigs
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
@@ -57,6 +63,14 @@ MULTIPLIES = {"C": ("aeration", "frequency_dependent", "position_grooves"), "T0"
 """Laws outside the library that multiply C or T0: of a change of it the force shows a share."""
 SMALL = 0.01
 """Relative change over which that share is differenced."""
+VANISHING = 1e-9
+"""Relative change of C that must make no force."""
+UNSETTLED = 1e-3
+"""Force that it makes [share of peak, r.m.s.] from which the force is that of chance: a fifth of the least change."""
+OWN = (0.003, 0.01, 2e-4)
+"""Standard deviations of offset [peak], gain and delay [s] of a test on this stand (`stand.ErrorsOfTest`)."""
+SAMPLES = 2000
+"""Samples of a test on which what shows is counted."""
 STAND = ("load_cell_zero", "load_cell_gain", "recorder_delay")
 
 
@@ -74,6 +88,8 @@ class Pair:
     """Share of each that the force shows where a law outside the library multiplies it, at every value of `base`."""
     outside: tuple[str, ...]
     equal: bool
+    hidden: tuple[str, ...] = ()
+    """Of what changed, that which leaves less than the least change beside the other one and what tests differ by."""
 
 
 def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | None:
@@ -99,6 +115,8 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
     outside = tuple(str(n) for n in rng.choice(list(OUTSIDE), int(rng.integers(1, 3)), replace=False))
     laws = case._sized_laws(outside, plain, coarse, scale, 1.0, rng)
     first = case.HiddenDamper(base, laws, 22.0)
+    if _differ(first, _moved_little(first), motions) > UNSETTLED:
+        return None
     names = {"changed": int(rng.integers(1, 3)), "same": 0, "stand": 0}[kind]
     truth: dict[str, Mapping[str, float]] = {}
     second = first
@@ -123,7 +141,77 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
         truth[name] = {name: by}
         after = tuple(_seen(r, name, by) for r in after)
     shown = {name: _shown(first, name, motions) for name in ELEMENT}
-    return Pair(before, after, truth, base, shown, outside, equal)
+    hidden = _hidden(first, {n: v for n, v in truth.items() if n not in STAND}, motions)
+    return Pair(before, after, truth, base, shown, outside, equal, hidden)
+
+
+def _moved_little(damper: case.HiddenDamper) -> case.HiddenDamper:
+    return _with(damper, "C", {"factor": 1.0 + VANISHING})
+
+
+def _with(damper: case.HiddenDamper, name: str, values: Mapping[str, float]) -> case.HiddenDamper:
+    """Return the damper in which one quantity changed."""
+    if name in ELEMENT:
+        row = tuple(values["factor"] * v for v in getattr(damper.base, name))
+        return replace(damper, base=replace(damper.base, **{name: row}))
+    return replace(damper, laws={**damper.laws, name: values})
+
+
+def _differ(one: case.HiddenDamper, other: case.HiddenDamper, motions: list[stand.Driven]) -> float:
+    """Return the r.m.s. difference of force of two dampers, each test in units of its peak."""
+    pairs = [(m, one.force(m, None), other.force(m, None)) for m in motions]
+    steady = [(a[m.time[::2] >= 0.0], b[m.time[::2] >= 0.0]) for m, a, b in pairs]
+    return float(np.sqrt(np.mean([np.mean((b - a) ** 2) / np.max(np.abs(a)) ** 2 for a, b in steady])))
+
+
+def _hidden(
+    first: case.HiddenDamper, truth: Mapping[str, Mapping[str, float]], motions: list[stand.Driven]
+) -> tuple[str, ...]:
+    """Return what of the changes leaves less than the least one, the other refitted, beside what tests differ by.
+
+    Each of two tests has an offset, a gain and a delay of its own, up to where chance leaves 95 % of them; the mean of
+    all tests is known by their number.
+    """
+    second = first
+    for name, values in truth.items():
+        second = _with(second, name, values)
+    tests = []
+    for m in motions:
+        at = np.flatnonzero(m.time[::2] >= 0.0)
+        at = at[:: max(1, at.size // SAMPLES)]
+        force = second.force(m, None)
+        peak = float(np.max(np.abs(force[at])))
+        own = np.column_stack([np.full(at.size, peak), force[at], -np.gradient(force, m.time[::2])[at]])
+        made = []
+        for name in truth:
+            less = first
+            for other, values in truth.items():
+                less = less if other == name else _with(less, other, values)
+            made.append((force - less.force(m, None))[at])
+        tests.append((np.array(made) / peak, own * np.sqrt(2.0) * np.array(OWN) / peak))
+    found = []
+    for i, name in enumerate(truth):
+        left = np.sqrt(np.mean([np.mean(r**2) for r in _left_of(i, tests)]))
+        found.extend([name] if left < SIZES[0] else [])
+    return tuple(found)
+
+
+def _left_of(change: int, tests: list[tuple[Array, Array]]) -> list[Array]:
+    """Return what is left in each test of a change beside the others and what the tests have of their own."""
+    others = [np.delete(made, change, axis=0) for made, _ in tests]
+    within = [np.linalg.lstsq(own, made[change], rcond=None)[0] for made, own in tests]
+    size = np.zeros(others[0].shape[0])
+    for _ in range(20):  # one after the other: own, then the other change, until they stand still
+        rest = [made[change] - size @ o for (made, _), o in zip(tests, others, strict=True)]
+        within = [np.linalg.lstsq(own, r, rcond=None)[0] for (_, own), r in zip(tests, rest, strict=True)]
+        chance = LEVEL / np.sqrt(len(tests))
+        mean = np.mean(within, axis=0)
+        within = [np.clip(b - mean + np.clip(mean, -chance, chance), -LEVEL, LEVEL) for b in within]
+        rest = [made[change] - own @ b for (made, own), b in zip(tests, within, strict=True)]
+        if not size.size:
+            return rest
+        size = np.linalg.lstsq(np.concatenate(others, axis=1).T, np.concatenate(rest), rcond=None)[0]
+    return [r - size @ o for r, o in zip(rest, others, strict=True)]
 
 
 def _shown(damper: case.HiddenDamper, name: str, motions: list[stand.Driven]) -> tuple[float, ...]:
@@ -160,12 +248,10 @@ def _changed(
     before = [damper.force(m, None)[m.time[::2] >= 0.0] for m in motions]
     for _ in range(8):
         if name in ELEMENT:
-            factor = float(np.exp(side * min(strength, 1.0)))
-            row = tuple(factor * v for v in getattr(damper.base, name))
-            changed, values = replace(damper, base=replace(damper.base, **{name: row})), {"factor": factor}
+            values = {"factor": float(np.exp(side * min(strength, 1.0)))}
         else:
             values = dict(LAWS[name].draw(default_rng(chance), scale, strength))
-            changed = replace(damper, laws={**damper.laws, name: values})
+        changed = _with(damper, name, values)
         after = [changed.force(m, None)[m.time[::2] >= 0.0] for m in motions]
         made = np.sqrt(np.mean([np.mean((a - b) ** 2) / np.max(np.abs(b)) ** 2
                                 for a, b in zip(after, before, strict=True)]))  # fmt: skip
@@ -196,9 +282,10 @@ def _seen(record: Record, name: str, by: float) -> Record:
     return replace(record, force=np.interp(record.time - by, record.time, record.force))
 
 
-def judged(found: Changes, truth: Mapping[str, Mapping[str, float]]) -> str:
-    """Return how a result stands to the truth."""
-    named = {c.name for c in found.changes if c.of == "damper"}
+def judged(found: Changes, truth: Mapping[str, Mapping[str, float]], hidden: Collection[str] = ()) -> str:
+    """Return how a result stands to the truth, of which some need not be named."""
+    named = {c.name for c in found.changes if c.of == "damper"} - set(hidden)
+    truth = {name: values for name, values in truth.items() if name not in hidden}
     of_damper = {name for name in truth if name not in STAND}
     told = {c.name for c in found.changes} | set(found.rivals)
     if found.verdict == "ambiguous" and set(truth) <= told:
@@ -283,6 +370,8 @@ class Outcome:
     """Whether something of the damper is listed as changed."""
     held: tuple[bool, ...]
     """Of each named truth, whether the interval of `to` holds it."""
+    of_shown: str = ""
+    """How the result stands to what of the truth shows; nothing where none of it does."""
 
 
 def outcome(given: argparse.Namespace, index: int, drawn: Pair) -> Outcome:
@@ -297,10 +386,13 @@ def outcome(given: argparse.Namespace, index: int, drawn: Pair) -> Outcome:
     say(
         f"{index:4d} {motions} {verdict:18s} {found.verdict:11s} {truth} -> {names} rivals {list(found.rivals)} "
         f"{100 * found.difference.share_of_peak:.2f} % away [{told}] outside {'+'.join(drawn.outside)} "
+        f"hidden {list(drawn.hidden)} "
         f"tests {len(drawn.before)} {seconds:.0f} s"
     )
     of_damper = any(c.of == "damper" for c in found.changes)
-    return Outcome(given.seed, index, given.kind, motions, verdict, of_damper, tuple(abs(a) <= 1.0 for _, a in far))
+    shown = judged(found, drawn.changed, drawn.hidden) if set(drawn.changed) - set(drawn.hidden) else ""
+    held = tuple(abs(a) <= 1.0 for _, a in far)
+    return Outcome(given.seed, index, given.kind, motions, verdict, of_damper, held, shown)
 
 
 def summary(outcomes: Iterable[Outcome]) -> Iterator[str]:
@@ -313,6 +405,9 @@ def summary(outcomes: Iterable[Outcome]) -> Iterator[str]:
         yield f"{kind}, {motions} motions, {len(own)} pairs: " + ", ".join(f"{n} {c}" for n, c in counts.most_common())
         if kind == "changed":
             yield f"  right or ambiguous with the truth: {_rate(counts['right'] + counts['ambiguous'], len(own))}"
+            shown = [each.of_shown for each in own if each.of_shown]
+            hits = sum(each in ("right", "ambiguous") for each in shown)
+            yield f"  of what shows, in the pairs in which something does: {_rate(hits, len(shown))}"
         yield f"  wrong name: {_rate(sum(c for n, c in counts.items() if n.startswith('wrong')), len(own))}"
         if kind != "changed":
             yield f"  something of the damper named: {_rate(sum(each.damper_named for each in own), len(own))}"

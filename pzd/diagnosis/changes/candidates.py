@@ -45,6 +45,12 @@ WEAK = 0.9
 """Slope beside C from which an effect without a linear coordinate starts too, as a share of it.
 
 Reason: the linearised step sizes the others; a relief valve that changes the force by a percent does it so."""
+CLOSEST = 0.7
+"""Largest ratio of two starts of a logarithmic parameter that have another one between them, where a law has several
+and no size.
+
+Reason: the force of a valve is no straight line in where it opens and how far; at a start 40 % off it leaves more than
+its absence, however well the true one explains the difference."""
 FAINT = 1e-3
 """The same for an effect of one logarithmic coordinate: a yield that is rounded over a thousandth of the largest speed.
 
@@ -327,14 +333,23 @@ def _absent(first: FirstState, name: str) -> Candidate:
 
     unscaled = all(c.logarithmic for c in coordinates)
     faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
+    several = unscaled and len(coordinates) > 1
     grid = itertools.product(
         *(
-            (*p.search.starts, *((WEAK,) if unscaled and p.unit == "N s/m" else ()), *faint)
+            (*(_closer(p.search.starts) if several else p.search.starts),
+             *((WEAK,) if unscaled and p.unit == "N s/m" else ()), *faint)
             for p in known_effect(name).parameters
         )
-    )
+    )  # fmt: skip
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
+
+
+def _closer(starts: Sequence[float]) -> tuple[float, ...]:
+    """Return starts with the geometric mean between any two that are far from each other."""
+    own = sorted(starts)
+    between = [float(np.sqrt(a * b)) for a, b in itertools.pairwise(own) if a < CLOSEST * b]
+    return tuple(sorted([*own, *between]))
 
 
 def _flexible(name: str) -> bool:

@@ -219,13 +219,33 @@ class Search:
         Flexible laws are asked where the others leave something clearly visible, and believed where they leave nothing
         of it: a force beside the element leaves no more than a law within would.
         """
-        best = self._best_end()
+        best = self._in_the_element(self._best_end())
         if self.left(best) < AS_GOOD * self._least(best) or not any(c.flexible for c in self.candidates):
             return best
         self._flexible = True
         further = self._best_end()
         self._flexible = self.left(further) < max(self._least(further), self._least(best))
         return further if self._flexible else best
+
+    def _in_the_element(self, best: Fitted) -> Fitted:
+        """Put a change of T0, C or k in the place of changes with one that is newly there, where it explains as much.
+
+        A law that the model lacks in both states goes with T0 or C: a tenth less of them leaves the tenth of what the
+        model misses, and a new effect would take that up. Only where the model misses visibly of the difference.
+        """
+        if self.hidden(best) < self.visible or not any(c.absent and c.of == "damper" for c in best.candidates):
+            return best
+        nothing = self.nothing()
+        own = [c for c in self.candidates if c.name in ELEMENT_COLUMNS]
+        alone = [self._with(nothing, p) for p in self._promising(nothing, own, nothing.scatter)]
+        enough = [
+            f
+            for f in alone
+            if self._admissible(f, self.adoptable(f))
+            and self.left(f) < self.adoptable(f)
+            and self._predicts(f, f.candidates[0])
+        ]
+        return min(enough, key=lambda f: (f.values.size, self.left(f)), default=best)
 
     def _best_end(self) -> Fitted:
         """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end.
@@ -410,7 +430,7 @@ class Search:
         worth = [p for i, p in enumerate(promising) if i < FITTED or (p.criterion < limit and i < 2 * FITTED)]
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
-        near = [f for f in fits if self._is_rival(f, best, less)]
+        near = [f for f in fits if self._is_rival(f, best, less) and self._leaves_less(f, less)]
         return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted))]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:

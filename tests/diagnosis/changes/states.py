@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pzd.artefacts import Rig
-from pzd.artefacts.changes import Changes
+from pzd.artefacts.changes import Change, Changes
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -98,3 +98,11 @@ def names(changes: Changes, of: str = "damper") -> list[str]:
 def names_told(changes: Changes) -> set[str]:
     """Names in what changed and among its rivals."""
     return {c.name for c in changes.changes} | set(changes.rivals)
+
+
+def inside(change: Change, ratio: float, slack: float = 1.0) -> bool:
+    """Whether a ratio of `to` to `from` lies in the interval, widened by a factor, at every voltage."""
+    columns = (change.from_, change.to, change.low95, change.high95)
+    start, to, low, high = (np.atleast_1d(np.asarray(each, dtype=float)) for each in columns)
+    half = 0.5 * slack * (high - low)
+    return bool(np.all(np.abs(to - ratio * start) <= half + 1e-9))

@@ -7,22 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import SPEED, campaign, drawn_damper, found, likelihood_between, names, names_told, scaled
+from states import SPEED, campaign, drawn_damper, found, inside, likelihood_between, names, names_told, scaled
 
-from pzd.artefacts.changes import Change
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.fit.intervals import LEVEL
 from pzd.record import Record
 from pzd.schema.errors import DataError
-
-
-def inside(change: Change, ratio: float, slack: float = 1.0) -> bool:
-    """Whether a ratio of `to` to `from` lies in the interval, widened by a factor, at every voltage."""
-    columns = (change.from_, change.to, change.low95, change.high95)
-    start, to, low, high = (np.atleast_1d(np.asarray(each, dtype=float)) for each in columns)
-    half = 0.5 * slack * (high - low)
-    return bool(np.all(np.abs(to - ratio * start) <= half + 1e-9))
 
 
 def test_the_same_damper_run_twice_did_not_change(rng: np.random.Generator) -> None:

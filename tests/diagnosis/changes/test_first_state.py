@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, names, names_told, state_of
+from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, found, inside, names, names_told, state_of
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
@@ -117,6 +117,43 @@ def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_num
     assert not search._admissible(fitted, 0.0)
     assert found._values([(opens, opens.low, np.inf)])[2:] == (None, None, None)
     assert names(found.changes()) == ["C"]
+
+
+def test_a_valve_that_opens_between_two_starts_of_the_search_promises_what_it_explains(
+    rng: np.random.Generator,
+) -> None:
+    """Its force is no straight line in where it opens, so that from 30 % off it would explain nothing."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.1 * FORCE, C_Ns_per_m=0.9 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
+    damper = Damper(base=(row,))
+    opened = damper.with_effect("relief_valve", {"F_r": 0.4 * FORCE, "C_r": 0.65 * row.C_Ns_per_m})
+    search = findings(rng, damper, opened).search
+    nothing = search.nothing()
+    (valve,) = [c for c in search.candidates if c.name == "relief_valve"]
+    size = search.regression.likelihood.size
+    (promise,) = search._promising(nothing, [valve], nothing.scatter)
+    whitened = [
+        W @ r for W, r in zip(search.regression.likelihood.whiteners(nothing.scatter), nothing.residuals, strict=True)
+    ]
+    assert promise.criterion - 2.0 * np.log(size) < 0.3 * sum(float(r @ r) for r in whitened)
+
+
+def bypassed(damping: float, rng: np.random.Generator) -> tuple[Record, ...]:
+    """Tests of a damper with a groove: less of C about the middle of the stroke, which no law of the library has."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.045 * FORCE, C_Ns_per_m=damping, k_N_per_m=100.0 * FORCE / STROKE)
+    motions = [(f, 0.025) for f in (0.33, 0.65, 1.0, 1.3, 1.9, 2.6)] + [(3.0, 0.01), (5.0, 0.005)]
+    tests = campaign(Damper(base=(row,)), rng, motions, noise=0.005)
+    less = [0.36 * damping * np.exp(-((r.displacement / 0.01) ** 2)) * r.velocity for r in tests]
+    return tuple(replace(r, force=r.force - f) for r, f in zip(tests, less, strict=True))
+
+
+def test_a_tenth_less_of_a_damping_that_the_model_knows_in_part_is_no_new_valve(rng: np.random.Generator) -> None:
+    """The tenth of what the model misses has the shape of no candidate, and a valve would take it up."""
+    for draw in rng.spawn(2):
+        changes = found(bypassed(FORCE / SPEED, draw), bypassed(0.9 * FORCE / SPEED, draw))
+        assert set(names(changes)) <= {"C"}
+        assert "C" in names_told(changes)
+        for change in changes.changes:
+            assert inside(change, 0.9)
 
 
 def outside(damper: Damper, rng: np.random.Generator, motions: tuple[tuple[float, float], ...]) -> list[Record]:
