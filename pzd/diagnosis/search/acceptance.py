@@ -422,18 +422,32 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     that gives way at once is a play, a gas that does not harden is an offset.
     """
     others = [c for c in tried if c.effect != chosen.effect and not _says_the_same(c, chosen)]
-    return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)
+    return tuple(
+        c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
+    )
 
 
 def _says_the_same(other: Candidate, chosen: Candidate) -> bool:
-    """Whether a law with more parameters gives the same force as the chosen one.
+    """Whether a law with more parameters gives the same force as the chosen one."""
+    more = other.fitted.optimum.size > chosen.fitted.optimum.size
+    return more and _share_apart(other, chosen) < thresholds.SAME_FORCE
 
-    Equation: |r_other - r_chosen|^2 < s |r_chosen - r_without|^2
+
+def _is_limit_of(other: Candidate, chosen: Candidate) -> bool:
+    """Whether a law with fewer parameters gives nearly the force of the chosen one, which is near its limit then."""
+    fewer = other.fitted.optimum.size < chosen.fitted.optimum.size
+    return fewer and _share_apart(other, chosen) < thresholds.NEAR_LIMIT
+
+
+def _share_apart(other: Candidate, chosen: Candidate) -> float:
+    """Compute how far two candidates are apart, as a share of what the chosen one does to the residuals.
+
+    Equation: |r_other - r_chosen|^2 / |r_chosen - r_without|^2
     """
-    if other.fitted.optimum.size <= chosen.fitted.optimum.size or other.fitted.size != chosen.fitted.size:
-        return False
+    if other.fitted.size != chosen.fitted.size or chosen.residual_change == 0.0:
+        return np.inf
     apart = np.concatenate(other.fitted.residuals) - np.concatenate(chosen.fitted.residuals)
-    return float(apart @ apart) < thresholds.SAME_FORCE * chosen.residual_change
+    return float(apart @ apart) / chosen.residual_change
 
 
 @dataclass(frozen=True, eq=False)
