@@ -170,6 +170,8 @@ class Effect:
     never_named: str | None = None
     """Why no verdict names it; a damper then has it only where held-out tests are predicted better with it, or where
     the config forces it. None for an effect that a verdict may name."""
+    imitates: bool = False
+    """Whether its numbers let it follow a part of nearly any difference of two forces: `pzd changes` asks it last."""
     order: int = 0
     """Order among the effects of its place, smaller numbers first."""
     needs_displacement_zero: bool = False

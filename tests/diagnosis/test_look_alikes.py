@@ -54,6 +54,21 @@ def test_a_law_that_gives_the_same_force_by_more_numbers_is_no_rival(
     assert rivals_of(other, (chosen, other), lenient) == (true,)
 
 
+@pytest.mark.parametrize(("pressed", "rivals"), [(4e-5, ("lash",)), (1e-3, ())])
+def test_a_mount_that_gives_way_almost_at_once_may_be_a_play(
+    pressed: float, rivals: tuple[str, ...], rng: np.random.Generator
+) -> None:
+    """Noise of 0.1 % tells them apart; but how a displacement was smoothed rounds the corner of a play as well."""
+    truth = damper_of(TWO, frame_compliance={"d_f": 1e-3, "s_f": pressed})
+    whole = evidence_of(campaign_of(sines(truth, rng, TWO, tests=SEVERAL, noise=1e-3)), damper_of(TWO)).whole
+    before = fit(whole, (), whole.start())
+    mount, play = (
+        converged(whole, before, candidate(whole, before, library()[effect])) for effect in ("frame_compliance", "lash")
+    )
+    assert play.delta_bic - mount.delta_bic > DiagnoseConfig().rival_bic
+    assert rivals_of(mount, (mount, play), DiagnoseConfig()) == rivals
+
+
 def test_a_pocket_is_searched_to_the_end_of_its_valley_where_the_weights_change(rng: np.random.Generator) -> None:
     """A stiff pocket shows d_c/s_c before either; nothing else is paid for the rest of the long way along."""
     row = BaseRow(T0_N=263.0, C_Ns_per_m=1473.0, k_N_per_m=1.9e6, voltage_V=0.0)

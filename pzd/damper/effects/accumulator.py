@@ -47,6 +47,7 @@ EFFECT = Effect(
         ({"x": 0.1, "F_g": 200.0, "L": 0.1}, -81.22523963562355),
     ),
     hidden=_hidden,
+    imitates=True,
 )
 
 

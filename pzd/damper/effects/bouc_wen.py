@@ -57,6 +57,7 @@ EFFECT = Effect(
         ({"deflection": 0.5e-3, "F_h": 200.0, "x_h": 1.0e-3}, 100.0),
     ),
     hidden=_hidden,
+    imitates=True,
     never_named="whatever friction builds up over a travel has its loop: the yield of a magneto-rheological fluid, a "
     "lip, rubber; and T0 takes up most of it, so that the name would rest on the rounding of its flank alone",
 )

@@ -55,6 +55,7 @@ EFFECT = Effect(
     ),
     order=1,  # a free play is taken up before anything is squeezed
     hidden=_hidden,
+    imitates=True,
 )
 
 

@@ -48,6 +48,7 @@ EFFECT = Effect(
     ),
     order=2,  # behind a free play, and a pocket
     hidden=_hidden,
+    imitates=True,
 )
 
 

@@ -73,9 +73,6 @@ STAND: Mapping[str, tuple[str, float]] = {
 """Unit and largest size of what the stand may have done to the force; the zero of the displacement moves no force."""
 NOT_HERE = ("sensor_delay", "temperature_drift")
 """Effects that are no change by themselves: one state's delay is in both, and a temperature is recorded."""
-IMITATORS = ("accumulator", "bouc_wen", "cavitation", "frame_compliance", "second_branch")
-"""Effects whose several numbers let them follow a part of any difference of two forces; beside them what no verdict
-names."""
 
 
 @dataclass(frozen=True)
@@ -334,13 +331,12 @@ def _absent(first: FirstState, name: str) -> Candidate:
     unscaled = all(c.logarithmic for c in coordinates)
     faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
     several = unscaled and len(coordinates) > 1
-    grid = itertools.product(
-        *(
-            (*(_closer(p.search.starts) if several else p.search.starts),
-             *((WEAK,) if unscaled and p.unit == "N s/m" else ()), *faint)
-            for p in known_effect(name).parameters
-        )
-    )  # fmt: skip
+
+    def tried(p: Parameter) -> tuple[float, ...]:
+        weak = (WEAK,) if unscaled and p.unit == "N s/m" else ()
+        return (*(_closer(p.search.starts) if several else p.search.starts), *weak, *faint)
+
+    grid = itertools.product(*map(tried, known_effect(name).parameters))
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
 
@@ -353,7 +349,8 @@ def _closer(starts: Sequence[float]) -> tuple[float, ...]:
 
 
 def _flexible(name: str) -> bool:
-    return name in IMITATORS or bool(known_effect(name).never_named)
+    effect = known_effect(name)
+    return effect.imitates or effect.never_named is not None
 
 
 def _present(first: FirstState, name: str) -> list[Candidate]:

@@ -205,8 +205,11 @@ class Uncertainty:
         What the stand does to all tests alike is none of them: each has an offset, gain and delay in the covariance.
         """
         own = {(c.name, c.parameter) for c in coordinates}
-        others = [slopes for candidate, slopes in self._alone.items() if candidate.key[0] not in own
-                  and not any(excludes(candidate, each) for each in self.fitted.candidates)]  # fmt: skip
+
+        def may_have_changed(candidate: Candidate) -> bool:
+            return candidate.key[0] not in own and not any(excludes(candidate, c) for c in self.fitted.candidates)
+
+        others = [slopes for candidate, slopes in self._alone.items() if may_have_changed(candidate)]
         if not others:
             return np.zeros(len(coordinates))
         stacks = [np.column_stack(each) for each in zip(*others, strict=True)]
