@@ -89,7 +89,7 @@ parameters counts as none.
 
 Reason: 3 % as r.m.s.: a law comes so near another one in its limit alone. Where noise makes an effect of its own size
 uncertain, two laws that it does not tell apart differ by more. Not tuned."""
-NEAR_LIMIT = 0.02
+LIMIT_CASE = 0.02
 """The same share, below which a law with fewer parameters is a rival of the adopted one, whatever the likelihood says.
 
 Reason: 14 % as r.m.s., about what the smoothing of a displacement makes of the corner of a play: 1 % in a swept test

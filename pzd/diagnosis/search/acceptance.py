@@ -436,7 +436,7 @@ def _says_the_same(other: Candidate, chosen: Candidate) -> bool:
 def _is_limit_of(other: Candidate, chosen: Candidate) -> bool:
     """Whether a law with fewer parameters gives nearly the force of the chosen one, which is near its limit then."""
     fewer = other.fitted.optimum.size < chosen.fitted.optimum.size
-    return fewer and _share_apart(other, chosen) < thresholds.NEAR_LIMIT
+    return fewer and _share_apart(other, chosen) < thresholds.LIMIT_CASE
 
 
 def _share_apart(other: Candidate, chosen: Candidate) -> float:
