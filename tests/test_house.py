@@ -233,6 +233,18 @@ def test_an_exception_without_rule_or_reason_is_found(mark: str, lines: list[int
     assert without_reason(f"x = 1  # {mark}\n") == lines
 
 
+def bound_twice(module: ast.Module) -> list[str]:
+    """Return the names that the statements of a module give a value to more than once: the last one overrules."""
+    targets = [t for node in module.body if isinstance(node, ast.Assign) for t in node.targets]
+    names = [t.id for t in targets if isinstance(t, ast.Name)]
+    return sorted({name for name in names if names.count(name) > 1})
+
+
+def test_no_constant_of_a_module_overrules_another_one_of_its_name() -> None:
+    assert {name: twice for name, path in modules(PACKAGE).items() if (twice := bound_twice(tree(path)))} == {}
+    assert bound_twice(ast.parse("NEAR = 0.02\nFAR = 1.0\nNEAR = 0.1")) == ["NEAR"]
+
+
 def test_every_random_draw_of_a_test_comes_from_the_one_fixture() -> None:
     own = {ROOT / "tests" / "conftest.py", Path(__file__)}
     tests = [path for path in SOURCES if "tests" in path.parts and "studies" not in path.parts and path not in own]
