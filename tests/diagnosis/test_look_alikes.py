@@ -54,6 +54,15 @@ def test_a_law_that_gives_the_same_force_by_more_numbers_is_no_rival(
     assert rivals_of(other, (chosen, other), lenient) == (true,)
 
 
+def test_a_gas_that_hardens_no_more_beside_a_spring_is_an_offset(rng: np.random.Generator) -> None:
+    """Alone it stands for offset and spring; beside the spring that comes later it has a column of a hundred metres."""
+    row = BaseRow(voltage_V=0.0, T0_N=60.0, C_Ns_per_m=1500.0, k_N_per_m=9e5)
+    truth = Damper(base=(row,), effects={"preload_offset": {"F_0": -180.0}, "gas_spring": {"k_g": 1600.0}})
+    records = sines(truth, rng, (0.0,), tests=((0.5, 0.02), (1.5, 0.02), (3.0, 0.02)), noise=4e-3, cycles=6)
+    told = diagnosed(records, forbid=all_but("accumulator", "preload_offset", "gas_spring")).diagnosis
+    assert (told.verdict, {*told.effects}) == ("named", {"preload_offset", "gas_spring"}), told.reason
+
+
 @pytest.mark.parametrize(("pressed", "rivals"), [(4e-5, ("lash",)), (1e-3, ())])
 def test_a_mount_that_gives_way_almost_at_once_may_be_a_play(
     pressed: float, rivals: tuple[str, ...], rng: np.random.Generator

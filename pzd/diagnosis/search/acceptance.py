@@ -421,13 +421,13 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
     that gives way at once is a play, a gas that does not harden is an offset.
     """
-    others = [c for c in tried if c.effect != chosen.effect and not _says_the_same(c, chosen)]
+    others = [c for c in tried if c.effect != chosen.effect and not says_the_same(c, chosen)]
     return tuple(
         c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
     )
 
 
-def _says_the_same(other: Candidate, chosen: Candidate) -> bool:
+def says_the_same(other: Candidate, chosen: Candidate) -> bool:
     """Whether a law with more parameters gives the same force as the chosen one."""
     more = other.fitted.optimum.size > chosen.fitted.optimum.size
     return more and _share_apart(other, chosen) < thresholds.SAME_FORCE

@@ -71,7 +71,8 @@ def swap_step(
     """Repeat the step in which an effect was adopted, with all effects adopted since; return what it adopts now.
 
     What came first was chosen beside less than is adopted now, and may have stood in for what came later. It stays
-    unless something that the data support is better by more than rivals differ, or its own values are impossible.
+    unless something that the data support is better by more than rivals differ, its own values are impossible, or
+    beside what came later it has come to its limit, where a simpler law is the same.
 
     Parameters
     ----------
@@ -98,6 +99,8 @@ def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
     """Whether a candidate replaces the adopted effect."""
     if against_nature(other.fitted.damper):
         return False
+    if other.delta_bic <= own.delta_bic and acceptance.says_the_same(own, other):
+        return True
     return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
 
 
