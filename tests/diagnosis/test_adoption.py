@@ -273,6 +273,22 @@ def test_a_branch_that_no_verdict_names_is_added_with_its_values(rng: np.random.
     assert {c.effect for c in tried} <= nameable().keys()
 
 
+def test_damping_by_grooves_that_no_verdict_names_is_handed_on(rng: np.random.Generator) -> None:
+    """Grooves about the middle of the stroke, in another form than the effect's: C(x) = C (1 - 0.3 (1 - (x/X)^2)^2)."""
+    records = []
+    for record in records_of(damper_of(TWO), rng):
+        share = 1.0 - (record.displacement / 0.03) ** 2
+        records.append(replace(record, force=record.force - 0.3 * 2700.0 * share**2 * record.velocity))
+    config = DiagnoseConfig(most_added=1, forbid=all_but("position_damping", "gas_spring", "shear_thinning"))
+    found, before = extended(tuple(records), config)
+    assert found.added == ("position_damping",)
+    assert found.error.criterion is not None
+    assert found.error.criterion < 0.05 * before
+    values = found.selection.fitted.damper.effects["position_damping"]
+    assert values["c_p"] == pytest.approx(-810.0, rel=0.1)
+    assert abs(values["x_p"]) < 1e-3
+
+
 def test_what_goes_with_t0_starts_in_proportion_to_it_at_each_voltage(rng: np.random.Generator) -> None:
     selection, _ = plain_selection(records_of(damper_of(TWO), rng), DiagnoseConfig())
     whole, effect = selection.initial_evidence.whole, library()["second_branch"]

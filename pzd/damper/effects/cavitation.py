@@ -53,6 +53,7 @@ EFFECT = Effect(
         ({"deflection": -0.004, "side": -1.0, "d_c": -0.002, "s_c": 0.001}, -0.0025615528128088303),
         ({"deflection": -0.004, "side": -1.0, "d_c": 0.002, "s_c": 0.001}, -0.004),
     ),
+    nearly=lambda values: soft_play(values["d_c"], values["s_c"]),
     order=1,  # a free play is taken up before anything is squeezed
     hidden=_hidden,
     imitates=True,
@@ -84,6 +85,17 @@ def slope(deflection: float, side: float, d_c: float, s_c: float) -> float:
 #
 # Equation: e = s + d s/(s + s_d), for s >= 0: Boyle's law of a pocket of length d at a static force p A, s_d = p A/k;
 # linear below 0. e is the elastic deflection, s = F/k the extension of the oil stiffness behind it.
+
+SOFT_PLAY = 0.15
+"""s_d/d below which pocket or mount may be a play whose faces give.
+
+Reason: it begins d/s_d times as soft as the oil, seven times and more, and nearly all of it is gone before the oil
+carries a force worth the name: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
+
+
+def soft_play(length: float, half: float) -> str | None:
+    """Return the name of the play that a pocket or a mount of a length d [m] is, with s_d [m]; None if it is none."""
+    return "lash" if half < SOFT_PLAY * abs(length) else None
 
 
 def deflection_with(extension: float, length: float, half: float) -> float:

@@ -419,12 +419,21 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     """Return the other effects that explain a step as well as the chosen one, best first.
 
     A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
-    that gives way at once is a play, a gas that does not harden is an offset.
+    that gives way at once is a play, a gas that does not harden is an offset. What it nearly is by its values is one.
     """
     others = [c for c in tried if c.effect != chosen.effect and not says_the_same(c, chosen)]
-    return tuple(
-        c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
-    )
+    found = [c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)]
+    nearly = {_nearly(chosen)} - {None, *found, *config.forbid, *chosen.fitted.effects}
+    return (*found, *(name for name in nearly if name is not None))
+
+
+def _nearly(chosen: Candidate) -> str | None:
+    """Return which simpler effect a candidate nearly is by its values, at every voltage."""
+    values = chosen.fitted.damper.effects[chosen.effect]
+    count = max((len(v) for v in values.values() if isinstance(v, tuple)), default=1)
+    single = [{key: v[i] if isinstance(v, tuple) else v for key, v in values.items()} for i in range(count)]
+    found = {library()[chosen.effect].nearly(each) for each in single}
+    return found.pop() if len(found) == 1 else None
 
 
 def says_the_same(other: Candidate, chosen: Candidate) -> bool:
