@@ -34,9 +34,28 @@ def test_a_wrong_unit_of_many_files_is_told_once_and_corrected_once(tmp_path: Pa
         write(tmp_path / f"{name}.csv", lines({"time_s": TIME, "pos": X, "force_N": FORCE}))
     entry = {"path": "*.csv", "columns": {"displacement": "pos"}}
     (said,) = wrong(tmp_path, entry | {"units": {"displacement": "mmm"}})
-    assert said.endswith("a.csv and 2 more files)")
+    assert said.endswith("a.csv) (and so in 2 more files)")
     (unit,) = re.findall(r"write one like '(\w+)'", said)
     assert len(run(tmp_path, entry | {"units": {"displacement": unit}}).records) == 3
+
+
+@pytest.mark.parametrize(
+    ("columns", "entry"),
+    [
+        ({"time_s": TIME, "position_m": X, "load": FORCE}, {}),
+        ({"time_s": np.arange(TIME.size, dtype=float), "displacement_m": X, "force_N": FORCE}, {}),
+    ],
+    ids=["a header that is nothing's", "a clock that counts samples"],
+)
+def test_what_is_wrong_alike_in_many_files_is_told_once(
+    columns: dict[str, Any], entry: dict[str, Any], tmp_path: Path
+) -> None:
+    for name in ("a", "b", "c"):
+        write(tmp_path / f"{name}.csv", lines(columns))
+    alone = refused(tmp_path, entry | {"path": "a.csv"})
+    together = refused(tmp_path, entry | {"path": "*.csv"})
+    assert len(together) == len(alone)
+    assert all("a.csv" in said and "(and so in 2 more files)" in said for said in together)
 
 
 # ---------------------------------------------------------------- columns and headers

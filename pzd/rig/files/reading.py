@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -41,7 +41,7 @@ from pzd.rig.files.refusals import refuse, sign_faults, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.motion import recorded_velocity
-from pzd.schema.errors import ConfigError, DataError, counted, no_file
+from pzd.schema.errors import Advised, ConfigError, DataError, counted, no_file
 from pzd.schema.model import safe_name
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -60,17 +60,25 @@ class Listed:
     """Number of the entry in the config, from 0."""
 
 
-def _said_once(faults: Iterable[str], names: Collection[str]) -> list[str]:
-    """Say a fault of the config once, with the first of the files that show it, of these names, and how many more."""
-    found: dict[str, list[str]] = {}
-    for fault in dict.fromkeys(faults):
-        about, _, file = fault.removesuffix(")").rpartition(" (in ")
-        if about and Path(file).name in names:
-            found.setdefault(about, []).append(file)
-        else:
-            found[fault] = []
-    more = {about: f" and {counted(len(files) - 1, 'more file')}" for about, files in found.items() if files[1:]}
-    return [f"{about} (in {files[0]}{more.get(about, '')})" if files else about for about, files in found.items()]
+def _said_once(faults: Iterable[tuple[Path, str]]) -> list[str]:
+    """Say a fault that several files show alike once, of the first of them, and of how many more.
+
+    Parameters
+    ----------
+    faults : each with its file; two are alike where they say the same but for the names of their files
+    """
+    alike: dict[str, list[str]] = {}
+    for path, fault in faults:
+        alike.setdefault(fault.replace(str(path), "").replace(path.name, ""), []).append(fault)
+    return [_of_several(first, len(more)) if more else first for first, *more in alike.values()]
+
+
+def _of_several(fault: str, more: int) -> str:
+    """Return a fault with the number of further files that have it, before its advice."""
+    so = f" (and so in {counted(more, 'more file')})"
+    if isinstance(fault, Advised):
+        return Advised(f"{fault.fault.rstrip(';')}{so};", *fault.advice)
+    return f"{fault}{so}"
 
 
 def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
@@ -311,8 +319,8 @@ def read(
     described = layouts(entries, control, folder)
     tests: list[tuple[RawRecord, DamperAlone]] = []
     layout_of: dict[Path, Layout] = {}
-    config_faults: list[str] = []
-    data_faults: list[str] = []
+    config_faults: list[tuple[Path, str]] = []
+    data_faults: list[tuple[Path, str]] = []
 
     def read_one(file: Listed) -> tuple[Layout | None, list[tuple[RawRecord, DamperAlone]]] | ConfigError | DataError:
         layout = described[file.number]
@@ -329,21 +337,21 @@ def read(
     store = OnDisk()
     for file, made in zip(files, parallel_each(read_one, files, jobs if worth and not alone else 1), strict=True):
         if isinstance(made, ConfigError):
-            config_faults += made.messages
+            config_faults += [(file.path, fault) for fault in made.messages]
         elif isinstance(made, DataError):
-            data_faults += made.messages
+            data_faults += [(file.path, fault) for fault in made.messages]
         else:
             layout_of[file.path] = made[0] or described[file.number]
             tests += [(store.kept(test), store.kept(alone)) for test, alone in made[1]]
     end_child()
     if config_faults:
-        raise ConfigError(_said_once(config_faults, {file.path.name for file in files}))
+        raise ConfigError(_said_once(dict.fromkeys(config_faults)))
     by_work: dict[bool, list[tuple[RawRecord, DamperAlone]]] = {False: [], True: []}
     for both in one_at_a_time(tests):
         by_work[works_on_the_rig(both[1])].append(both)
-    data_faults += sign_faults(by_work[True], layout_of, by_work[False])
-    if data_faults:
-        raise DataError(data_faults)
+    wrong_signs = sign_faults(by_work[True], layout_of, by_work[False])
+    if data_faults or wrong_signs:
+        raise DataError([*_said_once(data_faults), *wrong_signs])
     called = names([(test.sheet.path, test.number) for test, _ in tests])
     told = with_copies_told([(name, *both) for name, both in zip(called, tests, strict=True)])
     return tuple(partial(preflight_record, name, test, alone, limits, control) for name, test, alone in told)
