@@ -154,7 +154,7 @@ class Support(Frozen):
     """Probability that other tests are predicted better with it, halved where another would do as well; None without
     two tests that are held out as a whole."""
     sure: Literal["certain", "likely", "open"]
-    """The same in a word."""
+    """The same in a word for the effect itself: `open` where the prediction is sure and what it stands for is not."""
     added: bool = False
     """Whether it came in for its prediction alone: what it stands for is open, however sure the prediction is."""
 

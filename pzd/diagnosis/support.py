@@ -81,7 +81,7 @@ def _support(
         folds=len(folds),
         replaced_by=other,
         confidence=confidence,
-        sure=_sureness(confidence),
+        sure="open" if added else _sureness(confidence),
         added=added,
     )
 

@@ -66,8 +66,13 @@ def test_what_was_added_for_its_prediction_alone_is_known_as_such(validation: Cr
     adoption = replace(adoption, selection=replace(adoption.selection, reasons={"gas_spring": ADDED}))
     found = support_of(adoption, validation)
     assert found["gas_spring"].added
-    assert found["gas_spring"].sure == "certain"
+    assert found["gas_spring"].sure == "open"
+    assert (
+        found["gas_spring"].confidence
+        == support_of(adoption_of(validation, **TRUE), validation)["gas_spring"].confidence
+    )
     assert not found["preload_offset"].added
+    assert found["preload_offset"].sure == "certain"
 
 
 def test_without_an_effect_there_is_nothing_to_support(validation: CrossValidation) -> None:
