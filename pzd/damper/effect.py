@@ -150,7 +150,11 @@ def _always(values: Mapping[str, float], damping: float) -> bool:
     return True
 
 
-def _nothing_else(values: Mapping[str, float]) -> str | None:
+Values = Mapping[str, float | tuple[float, ...]]
+"""Parameters by name: a value, or one per voltage."""
+
+
+def _nothing_else(values: Values) -> str | None:
     """Return no other effect: the default of `Effect.nearly`."""
     return None
 
@@ -183,8 +187,8 @@ class Effect:
     """Whether its law depends on the zero of the displacement, which a fit then looks for too."""
     same_at_every_voltage: bool = False
     """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
-    nearly: Callable[[Mapping[str, float]], str | None] = _nothing_else
-    """Which simpler effect most would call it with such values, however well tests tell the two apart: its rival."""
+    nearly: Callable[[Values], str | None] = _nothing_else
+    """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
     natural: Callable[[Mapping[str, float], float], bool] = _always
     """Whether its parameters are physical together, given the C of the element [N s/m]."""
 

@@ -94,6 +94,11 @@ LIMIT_CASE = 0.02
 
 Reason: 14 % as r.m.s., about what the smoothing of a displacement makes of the corner of a play: 1 % in a swept test
 whose lash passed for a hardening frame."""
+LAW_ERROR = 0.05
+"""Share of the gap, as a mean square, by which the law of a real effect may depart from the library's.
+
+Reason: 22 % as r.m.s.: soft knees of valves, other roots for a rounded yield and rubber on the faces of a play left
+1 to 4 % for a second law of the same place (five rigs by a simulator of other authorship)."""
 END_STOP_BEGINS = 0.4
 """Share of the half stroke about its middle within which no end stop begins.
 

@@ -48,6 +48,7 @@ from pzd.diagnosis.verdict import (
     knee_verdict,
     no_prediction_note,
     no_slip_diagnosis,
+    with_bent_laws,
 )
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
@@ -94,6 +95,8 @@ def diagnose_setting(
     validation = cross_validation_of(campaign, baseline, diagnose.visible)
     selected = select_effects(campaign, baseline, diagnose, jobs)
     adoption, decision = conclude(selected, validation, diagnose, control.unit)
+    support = support_of(adoption, validation)
+    decision = with_bent_laws(decision, adoption.selection, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
@@ -113,7 +116,7 @@ def diagnose_setting(
         parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=final.zero_m,
-        support=support_of(adoption, validation),
+        support=support,
         left_of_peak=visible_gap(campaign.checks(selection.fitted.damper)),
         ranking=ranking_of(selection, selection.initial_evidence),
         rivals=(*selection.rivals, *decision.possible),

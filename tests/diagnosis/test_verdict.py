@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,15 +14,18 @@ from scipy.integrate import quad
 from scipy.optimize import least_squares
 from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, problem_of, sine, sines
 
+from pzd.artefacts.diagnosis import Support
+from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.least_squares import FitResult, fit
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.search.acceptance import Detection, detections
+from pzd.diagnosis.search.acceptance import Detection, Selection, detections
 from pzd.diagnosis.search.candidates import candidates
 from pzd.diagnosis.thresholds import LIKELIER_THAN_NOT
-from pzd.diagnosis.verdict import NuisanceTrend, nuisance_trend
+from pzd.diagnosis.verdict import Decision, NuisanceTrend, nuisance_trend, with_bent_laws
 from pzd.record import Array, Record, sliced
 
 TESTS = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.03))
@@ -398,3 +402,35 @@ def test_what_chance_may_hardly_explain_is_reported_as_open(rng: np.random.Gener
     order = ["unseen", "open", "adopted"]
     assert set(said) == set(order)
     assert said == sorted(said, key=order.index)
+
+
+@pytest.mark.parametrize(
+    ("shares", "said"),
+    [
+        ({"relief_valve": 0.11, "shear_thinning": 0.01}, "ambiguous"),
+        ({"rounded_yield": 0.23, "shear_thinning": 0.04, "orifice_quadratic": 0.01}, "ambiguous"),
+        ({"frame_compliance": 0.02, "lash": 0.01}, "ambiguous"),
+        ({"orifice_quadratic": 0.73, "asymmetry": 0.23}, "named"),
+        ({"accumulator": 0.98, "fluid_inertia": 0.03}, "named"),
+        ({"accumulator": 0.97, "orifice_quadratic": 0.02}, "named"),
+        ({"relief_valve": 0.01}, "named"),
+    ],
+)
+def test_a_little_of_another_law_of_the_same_place_may_be_how_the_first_one_really_bends(
+    shares: dict[str, float], said: str
+) -> None:
+    """A soft knee is a valve and a little thinning; a gas and a little inertia are two things."""
+    support = {
+        name: Support(share=share, folds_better=5, folds=5, replaced_by=None, confidence=0.99, sure="certain")
+        for name, share in shares.items()
+    }
+    effects = {
+        name: {each.name: min(each.neutral, each.high) for each in library()[name].parameters} for name in shares
+    }
+    nothing = np.zeros((0, 0))
+    fitted = FitResult(damper_of(TWO, **effects), tuple(shares), nothing, (), (), (), nothing, cast("Any", None))
+    selection = Selection(fitted, fitted, (), {}, cast("Evidence", None), cast("Evidence", None))
+    named = Decision("named", "the gap falls to nothing", 0.97)
+    found = with_bent_laws(named, selection, support)
+    assert found.verdict == said
+    assert (found.reason == named.reason) == (said == "named")

@@ -93,9 +93,12 @@ Reason: it begins d/s_d times as soft as the oil, seven times and more, and near
 carries a force worth the name: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
 
 
-def soft_play(length: float, half: float) -> str | None:
-    """Return the name of the play that a pocket or a mount of a length d [m] is, with s_d [m]; None if it is none."""
-    return "lash" if half < SOFT_PLAY * abs(length) else None
+def soft_play(length: float | tuple[float, ...], half: float | tuple[float, ...]) -> str | None:
+    """Return the name of the play that a pocket or a mount of a length d [m] is, with s_d [m]; None if it is none.
+
+    Either may be one for each voltage: it is a play if it is one at all of them.
+    """
+    return "lash" if np.all(np.asarray(half) < SOFT_PLAY * np.abs(length)) else None
 
 
 def deflection_with(extension: float, length: float, half: float) -> float:

@@ -1,6 +1,8 @@
 """A constant force: the gas charge at mid-stroke, a weight on the load cell, or its zero offset.
 
-Law: F_0. Range: gas-charged dampers 50-300 N.
+Law: F_0. Range: gas-charged dampers 50-300 N. Friction that differs between the two directions, T0 (1 + alpha sign(F)),
+is the constant alpha T0 as long as the rod slips: neither gas nor zero knows the control signal, so an offset that goes
+with it may be an `asymmetry` of the friction alone.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ EFFECT = Effect(
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
+    nearly=lambda values: "asymmetry" if isinstance(values["F_0"], tuple) else None,
     hidden=growing("F_0", lambda s: 0.5 * s.force, either=True),
 )
 

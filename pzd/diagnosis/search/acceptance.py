@@ -419,21 +419,12 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     """Return the other effects that explain a step as well as the chosen one, best first.
 
     A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
-    that gives way at once is a play, a gas that does not harden is an offset. What it nearly is by its values is one.
+    that gives way at once is a play, a gas that does not harden is an offset.
     """
     others = [c for c in tried if c.effect != chosen.effect and not says_the_same(c, chosen)]
-    found = [c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)]
-    nearly = {_nearly(chosen)} - {None, *found, *config.forbid, *chosen.fitted.effects}
-    return (*found, *(name for name in nearly if name is not None))
-
-
-def _nearly(chosen: Candidate) -> str | None:
-    """Return which simpler effect a candidate nearly is by its values, at every voltage."""
-    values = chosen.fitted.damper.effects[chosen.effect]
-    count = max((len(v) for v in values.values() if isinstance(v, tuple)), default=1)
-    single = [{key: v[i] if isinstance(v, tuple) else v for key, v in values.items()} for i in range(count)]
-    found = {library()[chosen.effect].nearly(each) for each in single}
-    return found.pop() if len(found) == 1 else None
+    return tuple(
+        c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
+    )
 
 
 def says_the_same(other: Candidate, chosen: Candidate) -> bool:
@@ -510,9 +501,15 @@ class Selection:
 
     @property
     def rivals(self) -> tuple[str, ...]:
-        """Effects that explain some step as well as the one adopted there, and were not adopted later."""
-        found = dict.fromkeys(name for step in self._undecided_steps for name in step.rivals)
-        return tuple(name for name in found if name not in self.adopted)
+        """Effects not adopted that explain some step as well as the one adopted there, or that it nearly is."""
+        found = [*(name for step in self._undecided_steps for name in step.rivals), *self.nearly.values()]
+        return tuple(name for name in dict.fromkeys(found) if name not in self.adopted)
+
+    @property
+    def nearly(self) -> dict[str, str]:
+        """By adopted effect, which other one it nearly is by its values."""
+        others = {name: library()[name].nearly(values) for name, values in self.fitted.damper.effects.items()}
+        return {name: other for name, other in others.items() if other is not None}
 
     @property
     def _undecided_steps(self) -> list[SelectionStep]:
