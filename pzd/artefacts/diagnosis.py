@@ -149,7 +149,7 @@ class Support(Frozen):
     folds: int = Field(ge=0)
     """Folds that hold out whole tests."""
     replaced_by: str | None
-    """Another effect that predicts as well in its place; None where none does."""
+    """Another effect that predicts as well in its place, or that it may be a part of; None where there is none."""
     confidence: float | None = Field(ge=0.0, le=1.0)
     """Probability that other tests are predicted better with it, halved where another would do as well; None without
     two tests that are held out as a whole."""

@@ -7,11 +7,15 @@ without its fold. All fits are by criterion (4), and the folds are those of the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import permutations
 from typing import Literal
 
 import numpy as np
 
 from pzd.artefacts.diagnosis import Support
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.cross_validation import CrossValidation
@@ -42,12 +46,40 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
         fewer = validation.fit_by_criterion(fitted.without_effects(name), validation.no_samples)
         return None if fewer is None else validation.error_to_first_order(*fewer)
 
-    errors = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
+    tried = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
+    errors = {name: error for name, error in tried if error is not None}
+    others = {**adoption.alternatives, **parts(damper, {n: _share(own, e, before) for n, e in errors.items()})}
     return {
-        name: _support(own, error, before, validation, adoption.alternatives.get(name), added=adoption.is_added(name))
-        for name, error in errors
-        if error is not None
+        name: _support(own, error, before, validation, others.get(name), added=adoption.is_added(name))
+        for name, error in errors.items()
     }
+
+
+def parts(damper: Damper, shares: Mapping[str, float]) -> dict[str, str]:
+    """Return the effects that may be a part of another one, by the library's law of that alone; each with the other.
+
+    Laws of one place bend the same curve: a valve that opens softly is a valve and a little thinning to a library whose
+    valves open at once. So what comes back of the gap without the smaller one must be more than a law is off by.
+
+    Parameters
+    ----------
+    damper : with the effects
+    shares : of the gap that come back without each
+    """
+    nearly = {name: library()[name].nearly(values) for name, values in damper.effects.items()}
+    found = {name: other for name, other in nearly.items() if other in damper.effects}
+    for name, other in permutations(shares, 2):
+        place = library()[name].place
+        alike = place == library()[other].place and place in ("flow", "stroke")
+        if alike and shares[name] < min(thresholds.LAW_ERROR, shares[other]):
+            found.setdefault(name, other)
+    return {name: other for name, other in found.items() if other is not None}
+
+
+def _share(own: PredictionError, without: PredictionError, plain: PredictionError) -> float:
+    """Compute the share of the baseline's sum of squared errors that comes back without an effect."""
+    total = float(plain.error.sum())
+    return min(max(float((without.error - own.error).sum()) / total, 0.0), 1.0) if total > 0.0 else 0.0
 
 
 def _support(
@@ -68,7 +100,6 @@ def _support(
 
     folds = [np.isin(own.records, sorted(held)) for held in validation.held_out_tests()]
     better = sum(bool(without.error[fold].sum() > own.error[fold].sum()) for fold in folds)
-    share = float((without.error - own.error).sum() / plain.error.sum()) if plain.error.sum() > 0.0 else 0.0
     held = sorted({i for tests in validation.held_out_tests() for i in tests})
     confidence = None
     if len(held) >= FEWEST_DIFFERENCES:
@@ -76,7 +107,7 @@ def _support(
         chance = float(stdtr(len(held) - 1, errors))
         confidence = round(chance / 2.0 if other else chance, 3)
     return Support(
-        share=min(max(share, 0.0), 1.0),
+        share=_share(own, without, plain),
         folds_better=better,
         folds=len(folds),
         replaced_by=other,

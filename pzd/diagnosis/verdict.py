@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.confounders import known
-from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
@@ -146,30 +144,19 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
     return Decision("named", words, sure, doubtful=bool(doubt))
 
 
-def with_bent_laws(decision: Decision, selection: Selection, support: Mapping[str, Support]) -> Decision:
+def with_parts_told(decision: Decision, support: Mapping[str, Support]) -> Decision:
     """Return the verdict, `ambiguous` for `named` where one adopted effect may be a part of another.
-
-    Laws of one place bend the same curve: a valve that opens softly is a valve and a little thinning to a library whose
-    valves open at once. So what comes back of the gap without the smaller one must be more than a law is off by.
 
     Parameters
     ----------
     decision : on what the selected effects leave
-    selection : effects adopted
-    support : of each
+    support : of every adopted effect
     """
-    if decision.verdict != "named":
-        return decision
-    place = {name: library()[name].place for name in selection.adopted}
-    parts = {name: other for name, other in selection.nearly.items() if other in selection.adopted}
-    for name, other in permutations(support, 2):
-        alike = place[name] == place[other] and place[name] in ("flow", "stroke")
-        if alike and support[name].share < min(thresholds.LAW_ERROR, support[other].share):
-            parts.setdefault(name, other)
-    if not parts:
+    parts = {name: each.replaced_by for name, each in support.items() if each.replaced_by in support}
+    if decision.verdict != "named" or not parts:
         return decision
     words = " and ".join(f"{name} may be a part of {other}" for name, other in parts.items())
-    why = "no law of the library need be as the damper's is"
+    why = "no law of the library need bend as the damper's does"
     return replace(decision, verdict="ambiguous", reason=f"{decision.reason}; but {words}: {why}")
 
 

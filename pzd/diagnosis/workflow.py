@@ -48,7 +48,7 @@ from pzd.diagnosis.verdict import (
     knee_verdict,
     no_prediction_note,
     no_slip_diagnosis,
-    with_bent_laws,
+    with_parts_told,
 )
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
@@ -96,7 +96,7 @@ def diagnose_setting(
     selected = select_effects(campaign, baseline, diagnose, jobs)
     adoption, decision = conclude(selected, validation, diagnose, control.unit)
     support = support_of(adoption, validation)
-    decision = with_bent_laws(decision, adoption.selection, support)
+    decision = with_parts_told(decision, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)

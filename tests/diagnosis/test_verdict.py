@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,15 +16,15 @@ from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, 
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.campaign import Evidence
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import FitResult, fit
+from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.search.acceptance import Detection, Selection, detections
+from pzd.diagnosis.search.acceptance import Detection, detections
 from pzd.diagnosis.search.candidates import candidates
+from pzd.diagnosis.support import parts
 from pzd.diagnosis.thresholds import LIKELIER_THAN_NOT
-from pzd.diagnosis.verdict import Decision, NuisanceTrend, nuisance_trend, with_bent_laws
+from pzd.diagnosis.verdict import Decision, NuisanceTrend, nuisance_trend, with_parts_told
 from pzd.record import Array, Record, sliced
 
 TESTS = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.03))
@@ -420,17 +419,15 @@ def test_a_little_of_another_law_of_the_same_place_may_be_how_the_first_one_real
     shares: dict[str, float], said: str
 ) -> None:
     """A soft knee is a valve and a little thinning; a gas and a little inertia are two things."""
+    effects = {name: {each.name: 0.05 for each in library()[name].parameters} for name in shares}
+    others = parts(damper_of(TWO, **effects), shares)
     support = {
-        name: Support(share=share, folds_better=5, folds=5, replaced_by=None, confidence=0.99, sure="certain")
+        name: Support(
+            share=share, folds_better=5, folds=5, replaced_by=others.get(name), confidence=0.99, sure="certain"
+        )
         for name, share in shares.items()
     }
-    effects = {
-        name: {each.name: min(each.neutral, each.high) for each in library()[name].parameters} for name in shares
-    }
-    nothing = np.zeros((0, 0))
-    fitted = FitResult(damper_of(TWO, **effects), tuple(shares), nothing, (), (), (), nothing, cast("Any", None))
-    selection = Selection(fitted, fitted, (), {}, cast("Evidence", None), cast("Evidence", None))
     named = Decision("named", "the gap falls to nothing", 0.97)
-    found = with_bent_laws(named, selection, support)
+    found = with_parts_told(named, support)
     assert found.verdict == said
     assert (found.reason == named.reason) == (said == "named")
