@@ -189,8 +189,17 @@ class Effect:
     """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
     nearly: Callable[[Values], str | None] = _nothing_else
     """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
+    by_speed_alone: bool = False
+    """Whether a force beside the flow depends on the speed alone, and so bends the same curve as what is in the flow."""
     natural: Callable[[Mapping[str, float], float], bool] = _always
     """Whether its parameters are physical together, given the C of the element [N s/m]."""
+
+    @property
+    def curve(self) -> Place | None:
+        """Place whose curve it bends: force by speed in the flow, deflection by force in the stroke; None for none."""
+        if self.by_speed_alone:
+            return "flow"
+        return self.place if self.place in ("flow", "stroke") else None
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter of that name.

@@ -58,7 +58,7 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
 def parts(damper: Damper, shares: Mapping[str, float]) -> dict[str, str]:
     """Return the effects that may be a part of another one, by the library's law of that alone; each with the other.
 
-    Laws of one place bend the same curve: a valve that opens softly is a valve and a little thinning to a library whose
+    Several laws bend one curve: a valve that opens softly is a valve and a little thinning to a library whose
     valves open at once. So what comes back of the gap without the smaller one must be more than a law is off by.
 
     Parameters
@@ -66,14 +66,17 @@ def parts(damper: Damper, shares: Mapping[str, float]) -> dict[str, str]:
     damper : with the effects
     shares : of the gap that come back without each
     """
-    nearly = {name: library()[name].nearly(values) for name, values in damper.effects.items()}
-    found = {name: other for name, other in nearly.items() if other in damper.effects}
+    found: dict[str, str] = {}
+    for name, values in damper.effects.items():
+        nearly = library()[name].nearly(values)
+        if nearly is not None and nearly in damper.effects:
+            found[name] = nearly
     for name, other in permutations(shares, 2):
-        place = library()[name].place
-        alike = place == library()[other].place and place in ("flow", "stroke")
+        curve = library()[name].curve
+        alike = curve is not None and curve == library()[other].curve
         if alike and shares[name] < min(thresholds.LAW_ERROR, shares[other]):
             found.setdefault(name, other)
-    return {name: other for name, other in found.items() if other is not None}
+    return found
 
 
 def _share(own: PredictionError, without: PredictionError, plain: PredictionError) -> float:

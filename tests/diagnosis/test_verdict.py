@@ -409,6 +409,7 @@ def test_what_chance_may_hardly_explain_is_reported_as_open(rng: np.random.Gener
         ({"relief_valve": 0.11, "shear_thinning": 0.01}, "ambiguous"),
         ({"rounded_yield": 0.23, "shear_thinning": 0.04, "orifice_quadratic": 0.01}, "ambiguous"),
         ({"frame_compliance": 0.02, "lash": 0.01}, "ambiguous"),
+        ({"rounded_yield": 0.3, "stribeck_friction": 0.002}, "ambiguous"),
         ({"orifice_quadratic": 0.73, "asymmetry": 0.23}, "named"),
         ({"accumulator": 0.98, "fluid_inertia": 0.03}, "named"),
         ({"accumulator": 0.97, "orifice_quadratic": 0.02}, "named"),
@@ -419,7 +420,7 @@ def test_a_little_of_another_law_of_the_same_place_may_be_how_the_first_one_real
     shares: dict[str, float], said: str
 ) -> None:
     """A soft knee is a valve and a little thinning; a gas and a little inertia are two things."""
-    effects = {name: {each.name: 0.05 for each in library()[name].parameters} for name in shares}
+    effects = {name: {each.name: max(0.05, each.low) for each in library()[name].parameters} for name in shares}
     others = parts(damper_of(TWO, **effects), shares)
     support = {
         name: Support(
