@@ -190,7 +190,7 @@ class Effect:
     nearly: Callable[[Values], str | None] = _nothing_else
     """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
     by_speed_alone: bool = False
-    """Whether a force beside the flow depends on the speed alone, and so bends the same curve as what is in the flow."""
+    """Whether a force beside the flow depends on the speed alone, so that it bends the same curve as the flow does."""
     natural: Callable[[Mapping[str, float], float], bool] = _always
     """Whether its parameters are physical together, given the C of the element [N s/m]."""
 
