@@ -154,7 +154,19 @@ Values = Mapping[str, float | tuple[float, ...]]
 """Parameters by name: a value, or one per voltage."""
 
 
-def _nothing_else(values: Values) -> str | None:
+@dataclass(frozen=True)
+class Beside:
+    """What stands beside an effect in a damper."""
+
+    effects: Mapping[str, Values]
+    """Every effect of the damper."""
+    T0: tuple[float, ...]
+    """Of every base row [N]."""
+    stretch: float
+    """Extension of the stiffest oil spring at the largest force of the tests [m]."""
+
+
+def _nothing_else(values: Values, beside: Beside) -> str | None:
     """Return no other effect: the default of `Effect.nearly`."""
     return None
 
@@ -187,7 +199,7 @@ class Effect:
     """Whether its law depends on the zero of the displacement, which a fit then looks for too."""
     same_at_every_voltage: bool = False
     """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
-    nearly: Callable[[Values], str | None] = _nothing_else
+    nearly: Callable[[Values, Beside], str | None] = _nothing_else
     """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
     by_speed_alone: bool = False
     """Whether a force beside the flow depends on the speed alone, so that it bends the same curve as the flow does."""

@@ -15,10 +15,10 @@ import numpy as np
 
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.effects import library
-from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.cross_validation import CrossValidation
+from pzd.diagnosis.search.acceptance import nearly_others
 from pzd.fit.cross_validation import FEWEST_DIFFERENCES, PredictionError, log_ratios, paired_t
 
 
@@ -48,14 +48,15 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
 
     tried = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
     errors = {name: error for name, error in tried if error is not None}
-    others = {**adoption.alternatives, **parts(damper, {n: _share(own, e, before) for n, e in errors.items()})}
+    nearly = nearly_others(damper, whole[0].scales.force)
+    others = {**adoption.alternatives, **parts(nearly, {n: _share(own, e, before) for n, e in errors.items()})}
     return {
         name: _support(own, error, before, validation, others.get(name), added=adoption.is_added(name))
         for name, error in errors.items()
     }
 
 
-def parts(damper: Damper, shares: Mapping[str, float]) -> dict[str, str]:
+def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, str]:
     """Return the effects that may be a part of another one, by the library's law of that alone; each with the other.
 
     Several laws bend one curve: a valve that opens softly is a valve and a little thinning to a library whose
@@ -63,14 +64,10 @@ def parts(damper: Damper, shares: Mapping[str, float]) -> dict[str, str]:
 
     Parameters
     ----------
-    damper : with the effects
-    shares : of the gap that come back without each
+    nearly : by effect, which other one it nearly is by its values
+    shares : of the gap that come back without each effect of the damper
     """
-    found: dict[str, str] = {}
-    for name, values in damper.effects.items():
-        nearly = library()[name].nearly(values)
-        if nearly is not None and nearly in damper.effects:
-            found[name] = nearly
+    found = {name: other for name, other in nearly.items() if other in shares}
     for name, other in permutations(shares, 2):
         curve = library()[name].curve
         alike = curve is not None and curve == library()[other].curve

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Beside, Effect, Parameter, Scales, Search, Strength
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -53,7 +53,7 @@ EFFECT = Effect(
         ({"deflection": -0.004, "side": -1.0, "d_c": -0.002, "s_c": 0.001}, -0.0025615528128088303),
         ({"deflection": -0.004, "side": -1.0, "d_c": 0.002, "s_c": 0.001}, -0.004),
     ),
-    nearly=lambda values: soft_play(values["d_c"], values["s_c"]),
+    nearly=lambda values, beside: soft_play(values["d_c"], values["s_c"], beside),
     order=1,  # a free play is taken up before anything is squeezed
     hidden=_hidden,
     imitates=True,
@@ -87,18 +87,19 @@ def slope(deflection: float, side: float, d_c: float, s_c: float) -> float:
 # linear below 0. e is the elastic deflection, s = F/k the extension of the oil stiffness behind it.
 
 SOFT_PLAY = 0.15
-"""s_d/d below which pocket or mount may be a play whose faces give.
+"""Share of its length, and of what the oil spring gives at the largest force, below which s_d makes a play of it.
 
-Reason: it begins d/s_d times as soft as the oil, seven times and more, and nearly all of it is gone before the oil
-carries a force worth the name: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
+Reason: pocket or mount then begins seven times as soft as the oil, and has given half of its way before the damper
+bears a seventh of its force: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
 
 
-def soft_play(length: float | tuple[float, ...], half: float | tuple[float, ...]) -> str | None:
+def soft_play(length: float | tuple[float, ...], half: float | tuple[float, ...], beside: Beside) -> str | None:
     """Return the name of the play that a pocket or a mount of a length d [m] is, with s_d [m]; None if it is none.
 
     Either may be one for each voltage: it is a play if it is one at all of them.
     """
-    return "lash" if np.all(np.asarray(half) < SOFT_PLAY * np.abs(length)) else None
+    soft = np.asarray(half) < SOFT_PLAY * np.minimum(np.abs(length), beside.stretch)
+    return "lash" if np.all(soft) else None
 
 
 def deflection_with(extension: float, length: float, half: float) -> float:

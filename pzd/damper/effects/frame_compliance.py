@@ -46,7 +46,7 @@ EFFECT = Effect(
         ({"deflection": 0.004, "side": 1.0, "d_f": 0.002, "s_f": 0.001}, 0.0025615528128088303),
         ({"deflection": -0.001, "side": -1.0, "d_f": 0.001, "s_f": 0.001}, -0.0006180339887498949),  # golden section
     ),
-    nearly=lambda values: soft_play(values["d_f"], values["s_f"]),
+    nearly=lambda values, beside: soft_play(values["d_f"], values["s_f"], beside),
     order=2,  # behind a free play, and a pocket
     hidden=_hidden,
     imitates=True,

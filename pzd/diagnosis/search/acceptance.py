@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Beside, Effect, Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
@@ -433,6 +433,20 @@ def says_the_same(other: Candidate, chosen: Candidate) -> bool:
     return more and _share_apart(other, chosen) < thresholds.SAME_FORCE
 
 
+def nearly_others(damper: Damper, force: float) -> dict[str, str]:
+    """Return by effect of a damper which other one it nearly is by its values.
+
+    Parameters
+    ----------
+    damper : with the effects
+    force : largest force of the tests [N]
+    """
+    stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
+    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), force / stiffest)
+    others = {name: library()[name].nearly(values, beside) for name, values in damper.effects.items()}
+    return {name: other for name, other in others.items() if other is not None}
+
+
 def _is_limit_of(other: Candidate, chosen: Candidate) -> bool:
     """Whether a law with fewer parameters gives nearly the force of the chosen one, which is near its limit then."""
     fewer = other.fitted.optimum.size < chosen.fitted.optimum.size
@@ -508,8 +522,7 @@ class Selection:
     @property
     def nearly(self) -> dict[str, str]:
         """By adopted effect, which other one it nearly is by its values."""
-        others = {name: library()[name].nearly(values) for name, values in self.fitted.damper.effects.items()}
-        return {name: other for name, other in others.items() if other is not None}
+        return nearly_others(self.fitted.damper, self.final_evidence.whole.scales.force)
 
     @property
     def _undecided_steps(self) -> list[SelectionStep]:
