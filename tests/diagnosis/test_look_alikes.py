@@ -13,7 +13,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import fit, refit, standard_errors
-from pzd.diagnosis.search.acceptance import rivals_of
+from pzd.diagnosis.search.acceptance import nearly_others, rivals_of
 from pzd.diagnosis.search.candidates import candidate, converged
 from pzd.diagnosis.search.forward_selection import reweighted
 
@@ -85,6 +85,27 @@ def test_a_mount_that_has_given_way_before_the_oil_bears_may_be_a_play_lined_wit
     records = sines(truth, rng, TWO, tests=SEVERAL, noise=1e-3)
     told = diagnosed(records, forbid=all_but("lash", "frame_compliance", "gas_spring")).diagnosis
     assert (told.verdict, told.effects, told.rivals) == ("ambiguous", ("frame_compliance",), ("lash",)), told.reason
+
+
+PLAY = {"frame_compliance": {"d_f": 4e-4, "s_f": 2e-5}}
+C_ALONE = {"asymmetry": {"alpha": 0.2}, "preload_offset": {"F_0": -0.2 * 300.0}}
+
+
+@pytest.mark.parametrize(
+    ("effects", "k", "nearly"),
+    [
+        (PLAY, 2e5, {"frame_compliance": "lash"}),
+        (PLAY, 2e7, {}),  # half of its way at 400 N: the mount is nearly all that gives
+        (C_ALONE, 2e5, {"preload_offset": "asymmetry"}),
+        ({**C_ALONE, "preload_offset": {"F_0": 60.0}}, 2e5, {}),
+        ({"preload_offset": {"F_0": 60.0}}, 2e5, {}),
+    ],
+)
+def test_an_effect_is_nearly_another_one_by_its_values_and_what_stands_beside_it(
+    effects: dict[str, dict[str, float]], k: float, nearly: dict[str, str]
+) -> None:
+    row = BaseRow(T0_N=300.0, C_Ns_per_m=2000.0, k_N_per_m=k)
+    assert nearly_others(Damper(base=(row,), effects=effects), force=800.0) == nearly
 
 
 def test_an_offset_that_goes_with_the_friction_may_be_an_asymmetry_of_it(rng: np.random.Generator) -> None:
