@@ -57,7 +57,7 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
 
 
 def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, str]:
-    """Return the effects that may be a part of another one, by the library's law of that alone; each with the other.
+    """Return the effects that may be another one or a part of it, by the law of the library; each with the other.
 
     Several laws bend one curve: a valve that opens softly is a valve and a little thinning to a library whose
     valves open at once. So what comes back of the gap without the smaller one must be more than a law is off by.
@@ -67,7 +67,7 @@ def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, s
     nearly : by effect, which other one it nearly is by its values
     shares : of the gap that come back without each effect of the damper
     """
-    found = {name: other for name, other in nearly.items() if other in shares}
+    found = dict(nearly)
     for name, other in permutations(shares, 2):
         curve = library()[name].curve
         alike = curve is not None and curve == library()[other].curve
