@@ -193,6 +193,8 @@ class Effect:
     the config forces it. None for an effect that a verdict may name."""
     imitates: bool = False
     """Whether its numbers let it follow a part of nearly any difference of two forces: `pzd changes` asks it last."""
+    asked_last: bool = False
+    """Whether the search for what predicts best asks it where nothing else helps: it would take up a part of much."""
     order: int = 0
     """Order among the effects of its place, smaller numbers first."""
     needs_displacement_zero: bool = False

@@ -102,7 +102,7 @@ class PredictiveSearch:
         return current
 
     def _neighbours(self, current: CriterionFit) -> Iterator[list[_Proposal]]:
-        """Yield what a step may go to: one effect more, two more, another in the place of one; each if asked for."""
+        """Yield what a step may go to: one effect more, two more, one in the place of another, what is asked last."""
         added = self._additions(current.problem, current.fitted)
         yield added
         budget = self.validation.campaign.budget
@@ -112,6 +112,9 @@ class PredictiveSearch:
             yield self._additions(first.problem, first.fitted)
         if budget.allows_more():
             yield self._exchanges(current)
+        if budget.allows_more():
+            last = self._further(current.problem, current.fitted, thresholds.SCREENED_EFFECTS, asked_last=True)
+            yield self._possible(current.problem, last)
 
     def _best(self, current: CriterionFit, tried: Sequence[_Proposal]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
@@ -137,8 +140,16 @@ class PredictiveSearch:
         found += self._further(problem, fitted, thresholds.SCREENED_EFFECTS)
         return self._possible(problem, found)
 
-    def _further(self, problem: Problem, fitted: FitResult, count: int, barred: Sequence[str] = ()) -> list[Candidate]:
-        """Fit the most promising effects beside those of a fit.
+    def _further(
+        self,
+        problem: Problem,
+        fitted: FitResult,
+        count: int,
+        barred: Sequence[str] = (),
+        *,
+        asked_last: bool = False,
+    ) -> list[Candidate]:
+        """Fit the most promising effects beside those of a fit, either those that are asked last or all others.
 
         What begins at some displacement is not tried: it would grow beyond the recorded stroke, where no test shows it.
         """
@@ -148,7 +159,10 @@ class PredictiveSearch:
         new = [
             effect
             for effect in library().values()
-            if effect.name not in barred and not effect.needs_displacement_zero and testable(problem, effect)
+            if effect.name not in barred
+            and effect.asked_last == asked_last
+            and not effect.needs_displacement_zero
+            and testable(problem, effect)
         ]
         campaign = self.validation.campaign
         promises = most_promising(problem, fitted, new, self.reached, campaign.jobs)[:count]

@@ -32,6 +32,7 @@ EFFECT = Effect(
         ({"x": 0.03, "v": -0.5, "c_p": 300.0, "x_p": 0.01, "w": 0.02}, -55.18191617571635),  # 150/e
     ),
     imitates=True,
+    asked_last=True,
     never_named="grooves, a port, a taper, wear and a side load all change the damping along the stroke, each with a "
     "shape of its own; the zone stands for any of them",
 )
