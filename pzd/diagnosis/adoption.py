@@ -218,7 +218,7 @@ def _rejection_reason(
     at = "" if worst is None or len(groups) == 1 else f" at {worst:.4g} {unit}"
     return (
         f"{' and '.join(selection.adopted)} would fit the tests, but {predicted} worse than by the "
-        f"plain damper (W_s {adopted:.2g} against {baseline:.2g}{at}), which is handed on"
+        f"plain damper (W_s {adopted:.2g} against {baseline:.2g}{at})"
     )
 
 

@@ -77,6 +77,8 @@ def conclude(
             tried = " and ".join(extended.selection.adopted)
             words = f"with {tried} kept-back tests are predicted no better than by the plain damper, which is handed on"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
+        elif adoption.rejection and not adoption.selection.adopted:
+            decision = replace(decision, reason=f"{decision.reason}, which is handed on")
         if added := adoption.added:
             stands = "it stands" if len(added) == 1 else "they stand"
             words = f"kept-back tests are predicted better with {' and '.join(added)}, whatever {stands} for"
