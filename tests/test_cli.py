@@ -27,7 +27,7 @@ from pzd.config import load
 from pzd.damper.effects import library
 from pzd.parallel.processes import Progress
 from pzd.quantities import Control
-from pzd.report.diagnosis_text import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines, headline
 from pzd.runs import Run
 
 COMMANDS = [
@@ -793,13 +793,20 @@ def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
         "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), "
         "gas spring is likely (9% of the gap comes back without it); 6.1 % of peak has no name"
     )
-    added = {**support, "bouc_wen": support["rounded_yield"].model_copy(update={"share": 0.2, "added": True})}
+    added = {
+        **support,
+        "bouc_wen": support["rounded_yield"].model_copy(update={"share": 0.2, "added": True, "sure": "open"}),
+    }
     assert diagnosis_lines(known.model_copy(update={"support": added}), Control())[0] == (
         "verdict: unexplained, but rounded yield is certain (61% of the gap comes back without it), "
         "gas spring is likely (9% of the gap comes back without it); "
         "bouc wen (20% of the gap comes back without it) predicts, whatever it stands for; 6.1 % of peak has no name"
     )
-    alone = {name: added[name].model_copy(update={"added": True}) for name in ("rounded_yield", "gas_spring")}
+    doubtful = {"bouc_wen": added["bouc_wen"].model_copy(update={"confidence": 0.8})}
+    assert "bouc wen" not in headline(known.model_copy(update={"support": {**support, **doubtful}}))
+    alone = {
+        name: added[name].model_copy(update={"added": True, "sure": "open"}) for name in ("rounded_yield", "gas_spring")
+    }
     assert diagnosis_lines(known.model_copy(update={"support": alone}), Control())[0] == (
         "verdict: unexplained, but rounded yield (61% of the gap comes back without it) and gas spring (9% of the gap "
         "comes back without it) predict, whatever they stand for; 6.1 % of peak has no name"

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         Prediction,
         Value,
     )
+    from pzd.artefacts.diagnosis import Support
     from pzd.quantities import Control
 
 _VERDICTS = {
@@ -78,7 +79,7 @@ def headline(diagnosis: Diagnosis) -> str:
     supported = [
         (name.replace("_", " "), each, f"({each.share:.0%} of the gap comes back without it)")
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
-        if each.sure != "open" and each.share >= _LEAST_SHARE
+        if (_predicts(each) if each.added else each.sure != "open") and each.share >= _LEAST_SHARE
     ]
     known = ", ".join(f"{name} is {each.sure} {share}" for name, each, share in supported if not each.added)
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
@@ -88,6 +89,13 @@ def headline(diagnosis: Diagnosis) -> str:
     words = [known] if known else []
     words += [f"{' and '.join(useful)} {predict}"] if useful else []
     return f"but {'; '.join(words)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
+
+
+def _predicts(each: Support) -> bool:
+    """Whether what was added for its prediction is likely to predict other tests better."""
+    from pzd.diagnosis.thresholds import DOUBTFUL_BELOW
+
+    return each.confidence is not None and each.confidence >= DOUBTFUL_BELOW
 
 
 def _open_names(diagnosis: Diagnosis) -> str:
