@@ -52,7 +52,7 @@ PRESENT = {
     "fluid_inertia": {"m": 20.0},
     "stribeck_friction": {"F_s": 80.0, "v_s": 0.02},
     "end_stop": {"k_e": 1e6, "x_e": 0.015},
-    "position_damping": {"c_p": -600.0, "x_p": 4e-3, "w": 8e-3},
+    "position_damping": {"c_p": -600.0, "x_p": 4e-3, "b_p": 8e-3},
     "cavitation": {"d_c": -2e-3, "s_c": 1e-3},
     "frame_compliance": {"d_f": 1e-3, "s_f": 1e-3},
     "accumulator": {"F_g": 250.0, "L": 0.05},

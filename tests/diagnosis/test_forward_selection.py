@@ -113,9 +113,9 @@ def test_rivals_of_one_step_stay_rivals_when_another_effect_is_adopted_but_not_w
     then = SelectionStep((), "asymmetry")
 
     def named(*effects: str) -> Selection:
-        standing: Any = SimpleNamespace(effects=effects)
-        nothing: Any = None
-        return Selection(standing, standing, (spring_or_mass, then), {}, nothing, nothing)
+        standing: Any = SimpleNamespace(effects=effects, damper=damper_of(TWO))
+        evidence: Any = SimpleNamespace(whole=SimpleNamespace(scales=SimpleNamespace(force=1000.0)))
+        return Selection(standing, standing, (spring_or_mass, then), {}, evidence, evidence)
 
     assert named("gas_spring", "asymmetry").rivals == ("fluid_inertia",)
     assert named("gas_spring", "asymmetry", "fluid_inertia").rivals == ()

@@ -58,7 +58,7 @@ BESIDE = {
     "accumulator": {"F_g": 250.0, "L": 0.04},
     "end_stop": {"k_e": 3e4, "x_e": 0.02},
     "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
-    "position_damping": {"c_p": 250.0, "x_p": 0.004, "w": 0.03},
+    "position_damping": {"c_p": 250.0, "x_p": 0.004, "b_p": 0.03},
     "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
 }
 IN_THE_FLOW = {

@@ -407,9 +407,11 @@ def test_the_derivatives_of_the_force_are_those_of_the_laws_beside_the_element(v
     put([displacement, velocity, acceleration], [x, v, 2.0])
     slave.exitInitializationMode()
     gas = 250.0 * 1.3 / 0.04 * (1.0 + (x - 0.004) / 0.04) ** -2.3  # of the accumulator
+    away = (x - 0.004 - 0.004) / 0.03  # from the middle of the zone of another damping
+    zone = 250.0 * np.exp(-(away**2))
     slopes = {
-        displacement: 3000.0 + gas,
-        velocity: -2.0 * v / v_s**2 * F_s * np.exp(-((v / v_s) ** 2)),
+        displacement: 3000.0 + gas - 2.0 * away / 0.03 * zone * v,
+        velocity: -2.0 * v / v_s**2 * F_s * np.exp(-((v / v_s) ** 2)) + zone,
         acceleration: 12.0,
     }
     for known, slope in slopes.items():

@@ -28,7 +28,7 @@ EFFECTS = {
     "lash": {"delta": 3e-4},
     "asymmetry": {"alpha": 0.1},
     "end_stop": {"k_e": 1e7, "x_e": 0.02},
-    "position_damping": {"c_p": -800.0, "x_p": 5e-3, "w": 0.02},
+    "position_damping": {"c_p": -800.0, "x_p": 5e-3, "b_p": 0.02},
     "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
     "cavitation": {"d_c": (1e-3, 2e-3), "s_c": (5e-4, 8e-4), "at_voltage_V": (0.0, 150.0)},
     "frame_compliance": {"d_f": 1e-3, "s_f": (5e-4, 8e-4), "at_voltage_V": (0.0, 150.0)},
