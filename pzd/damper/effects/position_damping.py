@@ -1,9 +1,9 @@
 """Damping that is another one in a zone of the stroke: bypass grooves, a port, a rod with a taper, a worn tube.
 
 Law: c_p v exp(-((x - x_p)/b_p)^2), c_p below 0 where the zone is softer. Range: half of C to either side, b_p a third
-of the stroke and more; a zone that is wider than the stroke, with its middle beyond an end, is damping that rises from one
-end to the other. It fades beyond the zone, so that nothing grows outside the tested stroke. One speed at several places
-of the stroke distinguishes it from every law of speed: a triangle, whose plateaus it bends.
+of the stroke and more; a zone that is wider than the stroke, with its middle beyond an end, is damping that rises from
+one end to the other. It fades beyond the zone, so that nothing grows outside the tested stroke. One speed at several
+places of the stroke distinguishes it from every law of speed: a triangle, whose plateaus it bends.
 """
 
 from __future__ import annotations
