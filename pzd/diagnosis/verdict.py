@@ -135,8 +135,11 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
     sure = verdict_confidence(selection, config)
     if selection.rivals or selection.competing_confounders:
         laws = [f"{known()[m.confounder].law} (not in the library)" for m in selection.competing_confounders]
-        others = ", ".join((*selection.rivals, *laws))
-        return Decision("ambiguous", f"{change}; {others} would do as well on these tests", sure)
+        called = {other: name for name, other in selection.nearly.items() if other in selection.rivals}
+        others = ", ".join((*(name for name in selection.rivals if name not in called), *laws))
+        told = [f"{others} would do as well on these tests"] if others else []
+        told += [f"{name} with such values may be {other}" for other, name in called.items()]
+        return Decision("ambiguous", f"{change}; {'; '.join(told)}", sure)
     if possible := _likelier_alternatives(selection, config):
         words = f"{change}{_not_excluded_note(selection, config)} beside it"
         sure = verdict_confidence(selection, config, possible)
