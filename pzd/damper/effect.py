@@ -150,7 +150,7 @@ def _always(values: Mapping[str, float], damping: float) -> bool:
     return True
 
 
-Values = Mapping[str, float | tuple[float, ...]]
+EffectValues = Mapping[str, float | tuple[float, ...]]
 """Parameters by name: a value, or one per voltage."""
 
 
@@ -158,7 +158,7 @@ Values = Mapping[str, float | tuple[float, ...]]
 class Beside:
     """What stands beside an effect in a damper."""
 
-    effects: Mapping[str, Values]
+    effects: Mapping[str, EffectValues]
     """Every effect of the damper."""
     T0: tuple[float, ...]
     """Of every base row [N]."""
@@ -166,7 +166,7 @@ class Beside:
     """Extension of the stiffest oil spring at the largest force of the tests [m]."""
 
 
-def _nothing_else(values: Values, beside: Beside) -> str | None:
+def _nothing_else(values: EffectValues, beside: Beside) -> str | None:
     """Return no other effect: the default of `Effect.nearly`."""
     return None
 
@@ -201,7 +201,7 @@ class Effect:
     """Whether its law depends on the zero of the displacement, which a fit then looks for too."""
     same_at_every_voltage: bool = False
     """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
-    nearly: Callable[[Values, Beside], str | None] = _nothing_else
+    nearly: Callable[[EffectValues, Beside], str | None] = _nothing_else
     """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
     by_speed_alone: bool = False
     """Whether a force beside the flow depends on the speed alone, so that it bends the same curve as the flow does."""

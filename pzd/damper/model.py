@@ -10,12 +10,11 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import NODE_VOLTAGES, Effect
+from pzd.damper.effect import NODE_VOLTAGES, Effect, EffectValues
 from pzd.damper.effects import library
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
 
-EffectValues = Mapping[str, float | tuple[float, ...]]
 Effects = dict[str, dict[str, float | tuple[float, ...]]]
 """Parameters of each effect, by its name and theirs."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.damper.effect import Beside, Effect, Parameter, Search, Values, growing
+from pzd.damper.effect import Beside, Effect, EffectValues, Parameter, Search, growing
 
 LIKE_FRICTION = 0.3
 """Share by which an offset differs from -alpha T0 and may yet be that.
@@ -17,7 +17,7 @@ LIKE_FRICTION = 0.3
 Reason: 0 to 15 % where damping alone differed between the directions (four rigs by a simulator of other authorship)."""
 
 
-def _of_the_friction(values: Values, beside: Beside) -> str | None:
+def _of_the_friction(values: EffectValues, beside: Beside) -> str | None:
     """Return `asymmetry` for an offset that goes with the control signal, or undoes the asymmetry of the friction."""
     if isinstance(values["F_0"], tuple):
         return "asymmetry"
