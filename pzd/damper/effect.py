@@ -13,8 +13,8 @@ drive
 material
     `friction_factor`, `damping_factor`, `stiffness_factor`: factors on T0, C and k by the recorded temperature.
 stroke
-    `law`: the extension of the oil stiffness, F = k extension, by the elastic deflection x - y and its side (+1 or -1),
-    rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force there.
+    `law`: the extension of the oil stiffness, F = k extension, by the elastic deflection x - y, its side (+1 or -1) and
+    k, rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force there.
     Whatever is in series with the oil stiffness and gives by the force alone has its place here: late filling, a
     compliant frame or mount, a gas volume that is compressed (accumulator, cavitation without its history).
 flow
@@ -162,8 +162,10 @@ class Beside:
     """Every effect of the damper."""
     T0: tuple[float, ...]
     """Of every base row [N]."""
-    stretch: float
-    """Extension of the stiffest oil spring at the largest force of the tests [m]."""
+    k: float
+    """Stiffest oil spring [N/m], infinite for a rigid damper."""
+    force: float
+    """Largest of the tests [N]."""
 
 
 def _nothing_else(values: EffectValues, beside: Beside) -> str | None:
@@ -254,9 +256,9 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
         name: Law(("temperature", "reference")) for name in ("friction_factor", "damping_factor", "stiffness_factor")
     },
     "stroke": {
-        "law": Law(("deflection", "side"), ("inverse",)),
-        "inverse": Law(("extension", "side"), suffices=False),
-        "slope": Law(("deflection", "side"), suffices=False),
+        "law": Law(("deflection", "side", "k"), ("inverse",)),
+        "inverse": Law(("extension", "side", "k"), suffices=False),
+        "slope": Law(("deflection", "side", "k"), suffices=False),
     },
     "flow": {
         "direction_factor": Law(("side",)),

@@ -33,8 +33,8 @@ IN_KERNEL: dict[str, dict[str, float]] = {
     "second_branch": {"T0_2": 60.0, "k_2": 3e4},
     "stribeck_friction": {"F_s": 60.0, "v_s": 0.03},
     "accumulator": {"F_g": 80.0, "L": 0.05},
-    "cavitation": {"d_c": -1.5e-3, "s_c": 5e-4},
-    "frame_compliance": {"d_f": 1e-3, "s_f": 5e-4},
+    "cavitation": {"d_c": -1.5e-3, "F_c": 100.0},
+    "frame_compliance": {"d_f": 1e-3, "F_f": 100.0},
     "bouc_wen": {"F_h": 60.0, "x_h": 2e-3, "sigma": 1.5},
 }
 FORMS: dict[str, dict[str, float]] = {

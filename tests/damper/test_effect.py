@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.confounders import known, module_of
-from pzd.damper.effect import Scales, functions
+from pzd.damper.effect import Scales, arguments, functions
 from pzd.damper.effects import effects_in, library, nameable
 
 GOOD = """
@@ -169,7 +169,11 @@ def test_inverses_of_the_flow_give_the_speed_back(name: str, rng: np.random.Gene
 
 @pytest.mark.parametrize("name", [name for name, effect in library().items() if effect.place == "stroke"])
 def test_the_inverse_of_a_stroke_law_gives_the_deflection_back(name: str, rng: np.random.Generator) -> None:
-    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5, rng)
+    values = hidden(name, 0.5, rng)
+    laws = {
+        law: (lambda first, side, call=call: call(first, side, *([2e5] if "k" in arguments(call) else []), **values))
+        for law, call in functions(library()[name], module_of(library()[name])).items()
+    }
     for e in (-0.01, -0.001, 0.002, 0.02):
         side = float(np.sign(e))
-        assert laws["inverse"](laws["law"](e, side, **values), side, **values) == pytest.approx(e, rel=1e-12)
+        assert laws["inverse"](laws["law"](e, side), side) == pytest.approx(e, rel=1e-12)

@@ -12,7 +12,7 @@ from pzd.rig.stand.frame import force_in_frame
 
 K = 2e5
 STUCK = Damper(base=(BaseRow(T0_N=800.0, C_Ns_per_m=2700.0, k_N_per_m=K),))
-MOUNT = {"d_f": 1.0e-3, "s_f": 4.0e-4}
+MOUNT = {"d_f": 1.0e-3, "F_f": 80.0}
 
 
 def sine(amplitude: float) -> Motion:
@@ -33,7 +33,7 @@ def secant(damper: Damper, amplitude: float) -> float:
 def test_strokes_without_slip_distinguish_a_frame_from_a_softer_k_and_a_free_play() -> None:
     mount, play = STUCK.with_effect("frame_compliance", MOUNT), STUCK.with_effect("lash", {"delta": 2.0e-3})
     softer = Damper(base=(STUCK.base[0].model_copy(update={"k_N_per_m": 0.3 * K}),))
-    assert secant(mount, 1e-6) == pytest.approx(K / (1.0 + MOUNT["d_f"] / MOUNT["s_f"]), rel=2e-3)
+    assert secant(mount, 1e-6) == pytest.approx(1.0 / (1.0 / K + MOUNT["d_f"] / MOUNT["F_f"]), rel=2e-3)
     assert secant(mount, 4e-3) > 2.0 * secant(mount, 5e-4)
     assert secant(softer, 4e-3) == pytest.approx(secant(softer, 5e-4), rel=1e-9)
     assert secant(play, 5e-4) == 0.0
@@ -56,8 +56,8 @@ def test_a_linear_frame_is_a_smaller_k_and_no_effect(frame: float) -> None:
 
 
 def test_where_it_gives_far_more_than_it_hardens_over_it_is_the_linear_frame() -> None:
-    """d_f and s_f to infinity at d_f/s_f = k/k_f."""
+    """d_f and F_f to infinity at F_f/d_f = k_f."""
     frame, motion = 1e6, sine(2e-2)
-    mount = STUCK.with_effect("frame_compliance", {"d_f": 0.1, "s_f": 0.1 * frame / K})
+    mount = STUCK.with_effect("frame_compliance", {"d_f": 0.1, "F_f": 0.1 * frame})
     force = respond(mount, motion)
     np.testing.assert_allclose(force, force_in_frame(STUCK, motion, frame), rtol=0, atol=0.02 * np.max(force))

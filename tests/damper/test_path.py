@@ -35,14 +35,14 @@ FLOWS = [
     {"lash": {"delta": (2e-4, 9e-4), "at_voltage_V": (0.0, 150.0)}},
     {"lash": {"delta": 4e-4}, "rounded_yield": {"w_s": 0.03}, "orifice_quadratic": {"q": 2000.0}},
     {"shear_thinning": {"n": 0.8}, "relief_valve": {"F_r": 900.0, "C_r": 400.0}, "asymmetry": {"alpha": -0.1}},
-    {"cavitation": {"d_c": 2e-3, "s_c": 4e-4}},
-    {"cavitation": {"d_c": (-2e-3, -1e-3), "s_c": (4e-4, 1e-3), "at_voltage_V": (0.0, 150.0)}},
-    {"frame_compliance": {"d_f": 1e-3, "s_f": 4e-4}},
-    {"frame_compliance": {"d_f": (2e-3, 1e-3), "s_f": (4e-4, 1e-3), "at_voltage_V": (0.0, 150.0)}},
+    {"cavitation": {"d_c": 2e-3, "F_c": 80.0}},
+    {"cavitation": {"d_c": (-2e-3, -1e-3), "F_c": (80.0, 200.0), "at_voltage_V": (0.0, 150.0)}},
+    {"frame_compliance": {"d_f": 1e-3, "F_f": 80.0}},
+    {"frame_compliance": {"d_f": (2e-3, 1e-3), "F_f": (80.0, 200.0), "at_voltage_V": (0.0, 150.0)}},
     {
         "lash": {"delta": 4e-4},
-        "cavitation": {"d_c": 1e-3, "s_c": 4e-4},
-        "frame_compliance": {"d_f": 1e-3, "s_f": 1e-3},
+        "cavitation": {"d_c": 1e-3, "F_c": 80.0},
+        "frame_compliance": {"d_f": 1e-3, "F_f": 200.0},
         "relief_valve": {"F_r": 900.0, "C_r": 400.0},
     },
     {"rounded_yield": {"w_s": 0.005}, "shear_thinning": {"n": 0.9}},
@@ -83,7 +83,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     F_r, C_r = values.get("F_r", np.inf), values.get("C_r", 1.0)
     pocket, mount = (
         [np.broadcast_to(values.get(name, neutral), 2) for name, neutral in pair]
-        for pair in ((("d_c", 0.0), ("s_c", 1.0)), (("d_f", 0.0), ("s_f", 1.0)))
+        for pair in ((("d_c", 0.0), ("F_c", 1.0)), (("d_f", 0.0), ("F_f", 1.0)))
     )
 
     def parameters(u: float) -> tuple[float, float, float]:
@@ -96,9 +96,9 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     def extension(e: float, u: float) -> float:
         """Extension of the oil stiffness: the free play is taken up first, then pocket and mount are squeezed."""
         e = np.sign(e) * max(abs(e) - at(play, u) / 2, 0.0)
-        d = at(pocket[0], u)
-        e = squeezed(e, abs(d) * (d * e > 0.0), at(pocket[1], u))
-        return squeezed(e, at(mount[0], u), at(mount[1], u))
+        d, k = at(pocket[0], u), parameters(u)[2]
+        e = squeezed(e, abs(d) * (d * e > 0.0), at(pocket[1], u) / k)
+        return squeezed(e, at(mount[0], u), at(mount[1], u) / k)
 
     def speed(F: float, T0: float, C: float) -> float:
         side = 1 + alpha * np.sign(F)

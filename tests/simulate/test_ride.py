@@ -30,8 +30,8 @@ EFFECTS = {
     "end_stop": {"k_e": 1e7, "x_e": 0.02},
     "position_damping": {"c_p": -800.0, "x_p": 5e-3, "b_p": 0.02},
     "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
-    "cavitation": {"d_c": (1e-3, 2e-3), "s_c": (5e-4, 8e-4), "at_voltage_V": (0.0, 150.0)},
-    "frame_compliance": {"d_f": 1e-3, "s_f": (5e-4, 8e-4), "at_voltage_V": (0.0, 150.0)},
+    "cavitation": {"d_c": (1e-3, 2e-3), "F_c": (100.0, 160.0), "at_voltage_V": (0.0, 150.0)},
+    "frame_compliance": {"d_f": 1e-3, "F_f": (100.0, 160.0), "at_voltage_V": (0.0, 150.0)},
     "accumulator": {"F_g": 250.0, "L": 0.1},
     "bouc_wen": {
         "F_h": (60.0, 300.0),

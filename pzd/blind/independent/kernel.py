@@ -97,9 +97,9 @@ class Parameters(NamedTuple):
     F_g: float = 0.0
     L: float = 1.0
     d_c: float = 0.0
-    s_c: float = 1.0
+    F_c: float = 1.0
     d_f: float = 0.0
-    s_f: float = 1.0
+    F_f: float = 1.0
     F_h: float = 0.0
     x_h: float = 1.0
     sigma: float = 0.5
@@ -196,9 +196,9 @@ def _spring_force(deflection: float, k: float, p: Parameters) -> float:
     """Return the force [N] of the oil spring, behind a play, a pocket and a mount."""
     e = outside.late_extension(deflection, p.gap) if p.gap > 0.0 else laws.dead_zone(deflection, p.delta)
     if p.d_c != 0.0:
-        e = laws.spring_behind_pocket(e, p.d_c, p.s_c)
+        e = laws.spring_behind_pocket(e, k, p.d_c, p.F_c)
     if p.d_f > 0.0:
-        e = laws.spring_behind_mount(e, p.d_f, p.s_f)
+        e = laws.spring_behind_mount(e, k, p.d_f, p.F_f)
     return k * e
 
 

@@ -154,7 +154,7 @@ LASH = Law("lash", lambda rng, scale, strength: {"delta": strength * 0.3 * scale
 def squeezed(load: float, length: float, half: float) -> float:
     """Return by how much [m] a cushion of some length [m] gives under a load >= 0, as an extension of the spring [m].
 
-    Equation: d s / (s + s_d): p V = const of a gas at a static pressure p A = k s_d            Source: Boyle 1662
+    Equation: d s / (s + s_d): p V = const of a gas at a static force p A = k s_d               Source: Boyle 1662
     """
     return length * load / (load + half)
 
@@ -176,40 +176,40 @@ def spring_behind_cushion(deflection: float, length: float, half: float) -> floa
 
 
 @compiled
-def spring_behind_pocket(deflection: float, d_c: float, s_c: float) -> float:
+def spring_behind_pocket(deflection: float, k: float, d_c: float, F_c: float) -> float:
     """Return what a pocket of gas in one chamber leaves of a deflection [m]: in rebound for d_c > 0.
 
-    Equation: x - y = e + d_c e / (e + s_c) on the side of the pocket
+    Equation: x - y = e + d_c F / (F + F_c) on the side of the pocket
     Source: Boyle's law; late filling as by Duym, Stiens and Reybrouck 1997, Vehicle System Dynamics 27
     """
     if d_c > 0.0 and deflection > 0.0:
-        return spring_behind_cushion(deflection, d_c, s_c)
+        return spring_behind_cushion(deflection, d_c, F_c / k)
     if d_c < 0.0 and deflection < 0.0:
-        return -spring_behind_cushion(-deflection, -d_c, s_c)
+        return -spring_behind_cushion(-deflection, -d_c, F_c / k)
     return deflection
 
 
 def _draw_cavitation(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
-    pressed = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05)))) * scale.stroke
-    return {"d_c": either_side(rng) * strength * 0.3 * scale.stroke, "s_c": pressed}
+    pressure = float(np.exp(rng.uniform(np.log(0.2), np.log(1.0)))) * scale.force
+    return {"d_c": either_side(rng) * strength * 0.3 * scale.stroke, "F_c": pressure}
 
 
 CAVITATION = Law("cavitation", _draw_cavitation)
 
 
 @compiled
-def spring_behind_mount(deflection: float, d_f: float, s_f: float) -> float:
+def spring_behind_mount(deflection: float, k: float, d_f: float, F_f: float) -> float:
     """Return what a mount that hardens to either side leaves of a deflection [m].
 
-    Equation: x - y = e + d_f e / (|e| + s_f)       Source: Mindlin 1945, Bell System Technical Journal 24
+    Equation: x - y = e + d_f F / (|F| + F_f)       Source: Mindlin 1945, Bell System Technical Journal 24
     """
-    s = spring_behind_cushion(abs(deflection), d_f, s_f)
+    s = spring_behind_cushion(abs(deflection), d_f, F_f / k)
     return s if deflection > 0.0 else -s
 
 
 def _draw_frame_compliance(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
-    pressed = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05)))) * scale.stroke
-    return {"d_f": strength * 0.3 * scale.stroke, "s_f": pressed}
+    half = float(np.exp(rng.uniform(np.log(0.2), np.log(1.0)))) * scale.force
+    return {"d_f": strength * 0.3 * scale.stroke, "F_f": half}
 
 
 FRAME_COMPLIANCE = Law("frame_compliance", _draw_frame_compliance)

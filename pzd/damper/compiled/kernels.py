@@ -86,6 +86,8 @@ def _rows() -> Iterator[str]:
     yield from _function("row_of(a)", f"return {_tuple('a[#]')}")
     yield from _function("nudged(p, i, by)", f"return {_tuple('p[#] + (by if i == # else 0.0)')}")
     same = " and ".join(f"p[{i}] == q[{i}]" for i in moved) or "True"
+    by_stiffness = [effect for effect in acting("stroke") if "k" in _takes(effect, "law")]
+    same = f"{same} and (p[{K}] == q[{K}] or ({_none_on(by_stiffness)}))"
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
     alike = " and ".join(f"p[{i}] == q[{i}]" for i in range(len(ELEMENT), _WIDTH)) or "True"
     yield from _function("effects_alike(p, q)", f"return {alike}")
@@ -114,14 +116,14 @@ def _drive() -> Iterator[str]:
 def _stroke() -> Iterator[str]:
     """Yield the stroke: each effect takes the deflection that the one before leaves."""
     effects = acting("stroke")
-    out, back, slope = [], [], ["slope = 1.0"]
+    out, back, slope, k = [], [], ["slope = 1.0"], f"p[{K}]"
     for effect in effects:
-        out += _guarded(effect, f"e = {_call(effect, 'law', deflection='e', side='side')}")
+        out += _guarded(effect, f"e = {_call(effect, 'law', deflection='e', side='side', k=k)}")
         if "slope" in functions(effect, module_of(effect)):
-            slope += _guarded(effect, f"slope *= {_call(effect, 'slope', deflection='e', side='side')}")
-        slope += _guarded(effect, f"e = {_call(effect, 'law', deflection='e', side='side')}")
+            slope += _guarded(effect, f"slope *= {_call(effect, 'slope', deflection='e', side='side', k=k)}")
+        slope += _guarded(effect, f"e = {_call(effect, 'law', deflection='e', side='side', k=k)}")
     for effect in reversed(effects):
-        back += _guarded(effect, f"s = {_call(effect, 'inverse', extension='s', side='side')}")
+        back += _guarded(effect, f"s = {_call(effect, 'inverse', extension='s', side='side', k=k)}")
     bent = _has(effects, "slope")
     yield from _function("stroke_law(e, side, p)", *out, "return e")
     yield from _function("stroke_inverse(s, side, p)", *back, "return s")

@@ -1,7 +1,7 @@
 """A pocket of vapour or gas in one chamber: after a reversal it is compressed before the oil carries the force.
 
-Law: F = k e, x - y = e + d_c e/(e + s_c) on the side of the pocket: Boyle's law of a pocket of length d_c at the
-pressure p_c, s_c = p_c A/k; on the other side nothing. d_c > 0: the force is missing in rebound, after a compression
+Law: F = k e, x - y = e + d_c F/(F + F_c) on the side of the pocket: Boyle's law of a pocket of length d_c at the
+pressure p_c, F_c = p_c A; on the other side nothing. d_c > 0: the force is missing in rebound, after a compression
 faster than the gas pressure allows; d_c < 0 in compression, behind a foot valve that starves. The dependence of the
 pocket on the speed of the stroke before is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is
 `lash`, distinguished by a slow sine: free play loses the same travel after both reversals, so the loop is odd and has
@@ -21,16 +21,16 @@ from pzd.damper.effect import Beside, Effect, Parameter, Scales, Search, Strengt
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     end = 0.25 * scales.stroke * float(draw.choice([-1.0, 1.0]))
-    pressed = float(np.exp(draw.uniform(np.log(0.01), np.log(0.05)))) * scales.stroke
-    return lambda s: {"d_c": end * s, "s_c": pressed}
+    pressure = float(np.exp(draw.uniform(np.log(0.2), np.log(1.0)))) * scales.force
+    return lambda s: {"d_c": end * s, "F_c": pressure}
 
 
-_S_C_SEARCH = Search(lambda s: s.stroke, (0.01, 0.1), logarithmic=True)
+_F_C_SEARCH = Search(lambda s: s.force, (0.1, 1.0), logarithmic=True)
 
 EFFECT = Effect(
     name="cavitation",
     place="stroke",
-    law="F = k e, x - y = e + d_c e/(e + s_c) on the side of the pocket",
+    law="F = k e, x - y = e + d_c F/(F + F_c) on the side of the pocket",
     parameters=(
         Parameter(
             "d_c",
@@ -41,64 +41,62 @@ EFFECT = Effect(
             "length of the pocket; above 0 it is squeezed in rebound, below in compression",
             Search(lambda s: s.stroke, (0.05, -0.05)),
         ),
-        Parameter(
-            "s_c", "m", 1.0e-3, 1.0e-7, 1.0, "extension of the oil spring at which half of it is left", _S_C_SEARCH
-        ),
+        Parameter("F_c", "N", 1.0e3, 1.0e-3, 1.0e9, "its pressure times the area: half of it is left there", _F_C_SEARCH),
     ),
     source="Boyle's law of a pocket in series with the oil; late filling: Duym, Stiens and Reybrouck 1997, Vehicle "
     "System Dynamics 27",
     tests=(
-        ({"deflection": 0.004, "side": 1.0, "d_c": 0.002, "s_c": 0.001}, 0.0025615528128088303),
-        ({"deflection": 0.001, "side": 1.0, "d_c": 0.001, "s_c": 0.001}, 0.0006180339887498949),  # golden section
-        ({"deflection": -0.004, "side": -1.0, "d_c": -0.002, "s_c": 0.001}, -0.0025615528128088303),
-        ({"deflection": -0.004, "side": -1.0, "d_c": 0.002, "s_c": 0.001}, -0.004),
+        ({"deflection": 0.004, "side": 1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, 0.0025615528128088303),
+        ({"deflection": 0.001, "side": 1.0, "k": 2e5, "d_c": 0.001, "F_c": 200.0}, 0.0006180339887498949),  # golden section
+        ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": -0.002, "F_c": 200.0}, -0.0025615528128088303),
+        ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, -0.004),
     ),
-    nearly=lambda values, beside: soft_play(values["d_c"], values["s_c"], beside),
+    nearly=lambda values, beside: soft_play(values["d_c"], values["F_c"], beside),
     order=1,  # a free play is taken up before anything is squeezed
     hidden=_hidden,
     imitates=True,
 )
 
 
-def law(deflection: float, side: float, d_c: float, s_c: float) -> float:
+def law(deflection: float, side: float, k: float, d_c: float, F_c: float) -> float:
     """Extension of the oil stiffness [m] at an elastic deflection x - y [m] on a side."""
     if side * d_c <= 0.0:
         return deflection
-    return side * extension_behind(side * deflection, abs(d_c), s_c)
+    return side * extension_behind(side * deflection, abs(d_c), F_c / k)
 
 
-def inverse(extension: float, side: float, d_c: float, s_c: float) -> float:
+def inverse(extension: float, side: float, k: float, d_c: float, F_c: float) -> float:
     """Elastic deflection [m] at an extension of the oil stiffness [m] on a side: the law inverted."""
     if side * d_c <= 0.0:
         return extension
-    return side * deflection_with(side * extension, abs(d_c), s_c)
+    return side * deflection_with(side * extension, abs(d_c), F_c / k)
 
 
-def slope(deflection: float, side: float, d_c: float, s_c: float) -> float:
+def slope(deflection: float, side: float, k: float, d_c: float, F_c: float) -> float:
     """Compute the derivative of the law by the deflection [-]."""
     if side * d_c <= 0.0:
         return 1.0
-    return extension_slope(side * deflection, abs(d_c), s_c)
+    return extension_slope(side * deflection, abs(d_c), F_c / k)
 
 
 # --- A pocket of gas or a mount, compressed by a force and by no more than its own length ---
 #
 # Equation: e = s + d s/(s + s_d), for s >= 0: Boyle's law of a pocket of length d at a static force p A, s_d = p A/k;
-# linear below 0. e is the elastic deflection, s = F/k the extension of the oil stiffness behind it.
+# linear below 0. e is the elastic deflection, s = F/k the extension of the oil stiffness behind it, s_d = F_d/k.
 
 SOFT_PLAY = 0.15
-"""Share of its length, and of what the oil spring gives at the largest force, below which s_d makes a play of it.
+"""Share of the largest force, and of what squeezes the oil spring by its length, below which F_d makes a play of it.
 
 Reason: pocket or mount then begins seven times as soft as the oil, and has given half of its way before the damper
 bears a seventh of its force: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
 
 
 def soft_play(length: float | tuple[float, ...], half: float | tuple[float, ...], beside: Beside) -> str | None:
-    """Return the name of the play that a pocket or a mount of a length d [m] is, with s_d [m]; None if it is none.
+    """Return the name of the play that a pocket or a mount of a length d [m] is, with F_d [N]; None if it is none.
 
     Either may be one for each voltage: it is a play if it is one at all of them.
     """
-    soft = np.asarray(half) < SOFT_PLAY * np.minimum(np.abs(length), beside.stretch)
+    soft = np.asarray(half) < SOFT_PLAY * np.minimum(np.abs(length) * beside.k, beside.force)
     return "lash" if np.all(soft) else None
 
 

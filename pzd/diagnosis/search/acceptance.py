@@ -442,7 +442,7 @@ def nearly_others(damper: Damper, force: float) -> dict[str, str]:
     force : largest force of the tests [N]
     """
     stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
-    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), force / stiffest)
+    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), stiffest, force)
     others = {name: library()[name].nearly(values, beside) for name, values in damper.effects.items()}
     return {name: other for name, other in others.items() if other is not None}
 
