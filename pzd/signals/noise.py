@@ -9,12 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.record import Array, Complex
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # --- Linear recursions: noise of first order, the warming of a lump, filters of any order ---
 
@@ -116,6 +120,27 @@ class Autoregression:
         for j, a in enumerate(self.coefficients, start=1):
             out -= a * series[p - j : len(series) - j]
         return out / np.sqrt(self.innovation) if self.innovation > 0.0 else out
+
+    def whitened_samples(self, places: NDArray[np.intp], sizes: Array, samples: int) -> csr_array:
+        """Whiten many series of so many samples, each of which is 0 but at one place.
+
+        Parameters
+        ----------
+        places, sizes : (m,) number of the sample and what it is, by series
+        samples : n
+
+        Returns
+        -------
+        (n - p, m), one column for each as `whitened` gives it
+        """
+        from scipy.sparse import coo_array
+
+        p, share = self.coefficients.size, 1.0 / np.sqrt(self.innovation) if self.innovation > 0.0 else 1.0
+        rows = places[:, np.newaxis] + np.arange(-p, 1)
+        values = share * sizes[:, np.newaxis] * self.whitening_filter
+        columns = np.broadcast_to(np.arange(places.size)[:, np.newaxis], rows.shape)
+        inside = (rows >= 0) & (rows < samples - p)
+        return coo_array((values[inside], (rows[inside], columns[inside])), (samples - p, places.size)).tocsr()
 
     def density(self, share_of_rate: Array) -> Array:
         """Compute the variance density at frequencies given as a share of the sampling rate.

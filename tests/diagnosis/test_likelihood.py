@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 from synthetic import TWO, campaign_of, damper_of, sine, sines
 
 from pzd.damper.compose import respond
@@ -275,11 +276,14 @@ def test_marginalised_residuals_have_the_likelihood_of_their_covariance(
     np.testing.assert_allclose(MarginalisedNuisances.from_columns(V).marginalised(r[:, 0]), left[:, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("columns", [dense, sparse])
-def test_the_likeliest_nuisances_are_those_of_ridge_regression(columns: Columns, rng: np.random.Generator) -> None:
-    V, r = columns(rng), rng.standard_normal(RESIDUALS)
-    exact = np.linalg.solve(np.eye(V.shape[1]) + V.T @ V, V.T @ r)
-    np.testing.assert_allclose(MarginalisedNuisances.from_columns(V).most_likely(r), exact, rtol=1e-6, atol=1e-9)
+def test_of_two_groups_of_nuisances_the_likelihood_is_that_of_all(rng: np.random.Generator) -> None:
+    """Columns of single samples, some of which overlap, are integrated out cluster by cluster, and before the others."""
+    V, local, r = dense(rng), sparse(rng), rng.standard_normal((RESIDUALS, 4))
+    local[:, 3:9] += np.roll(local[:, 3:9], 2, axis=0)
+    left = MarginalisedNuisances.from_columns(V, csr_array(local)).marginalised(r)
+    both = np.column_stack([V, local])
+    exact = r.T @ np.linalg.solve(np.eye(RESIDUALS) + both @ both.T, r)
+    np.testing.assert_allclose(left.T @ left, exact, rtol=1e-9, atol=1e-9)
 
 
 def test_without_nuisances_marginalisation_changes_nothing(rng: np.random.Generator) -> None:

@@ -34,6 +34,14 @@ def test_whitened_noise_is_white_and_of_unit_variance(rng: np.random.Generator) 
     assert abs(np.mean(white[1:] * white[:-1])) < 5.0 / np.sqrt(white.size)
 
 
+def test_single_samples_are_whitened_as_series_of_nothing_else(rng: np.random.Generator) -> None:
+    noise, places, sizes = autoregression([coloured(rng, 400, 2.0, 0.7)]), np.array([0, 3, 20, 49]), rng.normal(size=4)
+    assert noise.coefficients.size > 0
+    series = np.zeros((50, 4))
+    series[places, np.arange(4)] = sizes
+    np.testing.assert_allclose(noise.whitened_samples(places, sizes, 50).toarray(), noise.whitened(series), atol=1e-15)
+
+
 def test_the_density_sums_to_the_variance(rng: np.random.Generator) -> None:
     found = autoregression([coloured(rng, 5000, 2.0, 0.5)])
     frequency = (np.arange(2000) + 0.5) / 2000

@@ -129,8 +129,7 @@ class Kept:
             return (*map(self._said, given.observations), rows, repr(rest))
         if isinstance(given, FitResult):
             return given.damper.model_dump_json(), given.effects, given.optimum.tobytes(), repr(given.misfit)
-        nuisances = given.nuisances.inner, given.nuisances.covariance
-        arrays = given.sample_indices, given.compared, given.measured, given.weights, *nuisances
+        arrays = given.sample_indices, given.compared, given.measured, given.weights, given.nuisances.inner
         return given.name, given.base_row, given.initial_force, *(array.tobytes() for array in arrays)
 
 

@@ -46,17 +46,16 @@ NEGLIGIBLE_NUISANCE = 1e-3
 """A nuisance that moves all residuals together by less [standard deviations of one] is left out.
 
 Reason: it would change the misfit by a millionth."""
-SPARSE = 0.2
-"""Share of nonzero numbers up to which the columns are stored sparse.
-
-Reason: a column for a sample beside a jump has as many as the noise remembers; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
 class MarginalisedNuisances:
     """Nuisances of a test with Gaussian priors, integrated out of the residuals.
 
-    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
+    Those of single samples, as beside a jump, overlap only where they are neighbours: they go first, cluster by cluster.
+
+    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R';
+    of two groups r' = S_2 S_1 r, S_1 of the first alone, S_2 of the second behind it, S_1 V_2: |r'|^2 is the same
                                                                             Source: Gaussian prior, marginal likelihood
 
     Examples
@@ -70,48 +69,69 @@ class MarginalisedNuisances:
 
     columns: Array | csr_array
     """(w, p) change V of the residuals by one standard deviation of each nuisance, in units of noise."""
-    inner: Array
+    inner: Array | csr_array
     """(p, p) M."""
-    covariance: Array
-    """(p, p) posterior covariance of the nuisances: R diag(1/(1 + s^2)) R'."""
+    before: MarginalisedNuisances | None = None
+    """Those that are integrated out before."""
 
     @classmethod
-    def from_columns(cls, columns: Array) -> MarginalisedNuisances:
-        """Prepare some nuisances (w, p), without those below `NEGLIGIBLE_NUISANCE`.
+    def from_columns(cls, columns: Array, local: Array | csr_array | None = None) -> MarginalisedNuisances:
+        """Prepare some nuisances, without those below `NEGLIGIBLE_NUISANCE`.
 
-        By the eigenvalues of the (p, p) products, which lose nothing of what shows.
+        Parameters
+        ----------
+        columns : (w, p) of nuisances that move all residuals
+        local : (w, l) of those that move a few each, integrated out before where they are sparse
         """
-        squares, right = np.linalg.eigh(columns.T @ columns)
-        shown = squares > NEGLIGIBLE_NUISANCE**2
-        squares, right = squares[shown], right[:, shown]
-        return cls(
-            _packed(columns),
-            (right * ((1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares)) @ right.T,
-            (right / (1.0 + squares)) @ right.T,
-        )
+        before = None
+        if isinstance(local, np.ndarray):
+            columns = np.hstack([columns, local])
+        elif local is not None and local.nnz:
+            before = cls(local, _inner_by_clusters((local.T @ local).tocsr()))
+            columns = before.marginalised(columns)
+        return cls(columns, _inner(columns.T @ columns), before)
 
     @classmethod
     def none(cls, residuals: int) -> MarginalisedNuisances:
         """Prepare no nuisances for so many residuals."""
-        return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
+        return cls(np.zeros((residuals, 0)), np.zeros((0, 0)))
 
     def marginalised(self, values: Array) -> Array:
         """Return values (w,) or (w, k) in units of noise with the nuisances integrated out."""
-        if not self.inner.size:
-            return values
-        return np.asarray(values - self.columns @ (self.inner @ (self.columns.T @ values)))
-
-    def most_likely(self, values: Array) -> Array:
-        """Return the (p,) most likely nuisances [standard deviations], given residuals (w,) before marginalisation."""
-        return np.asarray(self.covariance @ (self.columns.T @ values))
+        left = values if self.before is None else self.before.marginalised(values)
+        if not self.inner.shape[0]:
+            return left
+        return np.asarray(left - self.columns @ (self.inner @ (self.columns.T @ left)))
 
 
-def _packed(columns: Array) -> Array | csr_array:
-    if not columns.size or np.count_nonzero(columns) > SPARSE * columns.size:
-        return columns
-    from scipy.sparse import csr_array
+def _inner(products: Array) -> Array:
+    """Return M (..., p, p) of the products V' V (..., p, p), by their eigenvalues, which lose nothing of what shows."""
+    squares, right = np.linalg.eigh(products)
+    shown = squares > NEGLIGIBLE_NUISANCE**2
+    squares = np.where(shown, squares, 1.0)
+    shares = np.where(shown, (1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares, 0.0)
+    return np.asarray((right * shares[..., np.newaxis, :]) @ np.swapaxes(right, -1, -2))
 
-    return csr_array(columns)
+
+def _inner_by_clusters(products: csr_array) -> csr_array:
+    """Return M (p, p) of products V' V (p, p) most of which are zero: cluster by cluster of columns that overlap."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, cluster = connected_components(products, directed=False)
+    sizes, order = np.bincount(cluster, minlength=count), np.argsort(cluster, kind="stable")
+    first = np.cumsum(sizes) - sizes
+    values, rows, columns = [], [], []
+    for size in np.unique(sizes):
+        members = order[first[sizes == size][:, np.newaxis] + np.arange(size)]
+        across = np.broadcast_to(members[:, :, np.newaxis], (*members.shape, size))
+        down = np.swapaxes(across, 1, 2)
+        block = products[across.ravel(), down.ravel()].reshape(across.shape)
+        values.append(_inner(block).ravel())
+        rows.append(across.ravel())
+        columns.append(down.ravel())
+    places = np.concatenate(rows), np.concatenate(columns)
+    return coo_array((np.concatenate(values), places), products.shape).tocsr()
 
 
 # --- Weighted records
@@ -223,6 +243,22 @@ class WeightedRecord:
     def standardised(self, values: Array) -> Array:
         """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
         return self.nuisances.marginalised(self._scaled(values))
+
+    def single_samples(self, sizes: Array) -> Array | csr_array:
+        """Return (w, j) in units of noise, one column for each of the (n,) sizes at the compared samples [N] but 0.
+
+        They are sparse where the record is compared sample by sample.
+
+        Flanks of several samples are left to chance too, one by one. Counted as evidence but for their instant, those
+        of a real damper, which no element has, outweighed everything else: its held-out tests were predicted 2.5 times
+        worse.
+        """
+        places = np.flatnonzero(sizes)
+        if isinstance(self.noise, Autoregression):
+            return self.noise.whitened_samples(places, sizes[places], sizes.size)[self._unbroken]
+        columns = np.zeros((sizes.size, places.size))
+        columns[places, np.arange(places.size)] = sizes[places]
+        return self._scaled(columns)
 
     def residual_and_slopes(self, force: Array, slopes: Array, sensors: Sensors = NO_SENSORS) -> Array:
         """Return the residual and its derivatives (w, 1 + p) in units of noise, every nuisance integrated out.
@@ -546,15 +582,10 @@ def with_nuisances(
     for _ in range(2):  # the second with the force where the likeliest delay puts it
         force = delayed(found.first_delay)
         bends = jumps(bare.measured, closed=True) if averaged else jumps_in_samples(bare.measured, force)
-        columns = np.column_stack(
-            [
-                np.full(force.size, nuisance.offset * bare.peak),
-                nuisance.gain * force,
-                _jump_columns(with_ringing(np.maximum(bends, turns), closed=averaged)),
-                *([] if timing is None else [timing]),
-            ]
-        )
-        found = replace(found, nuisances=MarginalisedNuisances.from_columns(bare.standardised(columns)))
+        columns = [np.full(force.size, nuisance.offset * bare.peak), nuisance.gain * force]
+        whole = bare.standardised(np.column_stack([*columns, *([] if timing is None else [timing])]))
+        beside = bare.single_samples(with_ringing(np.maximum(bends, turns), closed=averaged))
+        found = replace(found, nuisances=MarginalisedNuisances.from_columns(whole, beside))
         if nuisance.delay_s > 0.0:
             if np.any(bends) or np.any(turns):
                 found = replace(found, first_delay=found.delay_among_jumps(delayed))
@@ -585,13 +616,3 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
     return replace(weighed, weights=weights, nuisances=nothing, delay_s=0.0)
 
 
-def _jump_columns(bends: Array) -> Array:
-    """Return (n, j) one column per sample beside a jump, as large as the force bends there [N].
-
-    Flanks of several samples are left to chance too. Counted as evidence but for their instant, those of a real damper,
-    which no element has, outweighed everything else: its held-out tests were predicted 2.5 times worse.
-    """
-    beside = np.flatnonzero(bends)
-    columns = np.zeros((bends.size, beside.size))
-    columns[beside, np.arange(beside.size)] = bends[beside]
-    return columns
