@@ -30,6 +30,8 @@ class ResidualCheck:
     prepared: PreparedRecord
     wanted: Mask
     """(n,) checked samples."""
+    calm: Mask
+    """(n,) samples beside no jump of the force."""
     residual: Array
     """(n,) measured less predicted force [N]."""
     nuisances: Array
@@ -99,9 +101,10 @@ def check_residual(
     explained = mains + min(ways, key=lambda way: float(np.sum((without - way)[mask] ** 2)))
     folded = _folded(prepared, residual - explained, mask)
     if folded is not None:
-        found = _check_cycles(prepared, mask, residual, explained, folded, given.shared_variance)
+        found = _check_cycles(prepared, mask, calm, residual, explained, folded, given.shared_variance)
     else:
-        found = _check_samples(prepared, mask, residual, explained, predicted, drawn_calm(given, calm, mask))
+        drawn = drawn_calm(given, calm, mask)
+        found = _check_samples(prepared, mask, calm, residual, explained, predicted, drawn)
     return replace(found, hum=float(np.max(np.abs(mains))))
 
 
@@ -149,6 +152,7 @@ def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Ar
 def _check_cycles(
     prepared: PreparedRecord,
     mask: Mask,
+    calm: Mask,
     residual: Array,
     nuisances: Array,
     folded: Array,
@@ -163,13 +167,14 @@ def _check_cycles(
     if trend is not None and trend < thresholds.CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
-        prepared, mask, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
+        prepared, mask, calm, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
     )
 
 
 def _check_samples(
     prepared: PreparedRecord,
     mask: Mask,
+    calm: Mask,
     residual: Array,
     nuisances: Array,
     predicted: Array,
@@ -183,7 +188,9 @@ def _check_samples(
     explained[mask] = fit.explained**2 - fit.spread
     power = float(np.mean(explained[mask]))
     probability = {"smooth": np.array([fit.probability])}
-    return ResidualCheck(prepared, mask, residual, nuisances, variance, power, probability, None, None, 0.0, explained)
+    return ResidualCheck(
+        prepared, mask, calm, residual, nuisances, variance, power, probability, None, None, 0.0, explained
+    )
 
 
 def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | None:

@@ -360,7 +360,7 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
     damper : that they are compared with
     config : which probability is significant, and what is visible
     """
-    checks = [c for c in campaign.checks(damper) if c.prepared.constant and c.wanted.any()]
+    checks = [c for c in campaign.checks(damper) if c.prepared.constant and (c.wanted & c.calm).any()]
     if not checks:
         return None
     condition = np.array([nearest_row(damper.base, c.prepared) for c in checks])
@@ -381,12 +381,15 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
 
 
 def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
-    """Estimate (n, 3) offset, gain, delay of every test in `NUISANCE_UNITS`, and (n, 3) force of one unit [peak]."""
+    """Estimate (n, 3) offset, gain, delay of every test in `NUISANCE_UNITS`, and (n, 3) force of one unit [peak].
+
+    Beside no jump: there a delay is the part of a sample by which a reversal lies off, which follows the motion.
+    """
     found, forces = [], []
     for check in checks:
-        force = check.predicted[check.wanted]
-        columns = nuisance_columns(force, check.prepared.record.rate, NUISANCE_UNITS, check.wanted)
-        found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
+        at = check.wanted & check.calm
+        columns = nuisance_columns(check.predicted[at], check.prepared.record.rate, NUISANCE_UNITS, at)
+        found.append(np.linalg.lstsq(columns, check.residual[at], rcond=None)[0])
         forces.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
     return np.array(found).reshape(-1, 3), np.array(forces).reshape(-1, 3)
 

@@ -95,7 +95,11 @@ C_ALONE = {"asymmetry": {"alpha": 0.2}, "preload_offset": {"F_0": -0.2 * 300.0}}
     ("effects", "k", "nearly"),
     [
         (PLAY, 2e5, {"frame_compliance": "lash"}),
-        ({"frame_compliance": {"d_f": 4e-4, "F_f": 400.0}}, np.inf, {}),  # half of its way at 400 N: the mount is nearly all that gives
+        (
+            {"frame_compliance": {"d_f": 4e-4, "F_f": 400.0}},
+            np.inf,
+            {},
+        ),  # half of its way at 400 N: the mount is nearly all that gives
         (C_ALONE, 2e5, {"preload_offset": "asymmetry"}),
         ({**C_ALONE, "preload_offset": {"F_0": 60.0}}, 2e5, {}),
         ({"preload_offset": {"F_0": 60.0}}, 2e5, {}),
@@ -122,6 +126,21 @@ def test_a_mount_beside_a_play_may_be_its_faces_that_give(rng: np.random.Generat
     told = diagnosed(records, forbid=all_but("lash", "frame_compliance", "cavitation")).diagnosis
     assert told.verdict == "ambiguous", told.reason
     assert "lash" in {*told.effects, *told.rivals}
+
+
+@pytest.mark.parametrize("name", ["frame_compliance", "cavitation"])
+@pytest.mark.parametrize("k", [1e6, np.inf])
+def test_a_mount_that_is_nearly_all_that_gives_is_found_however_stiff_the_oil_is(
+    name: str, k: float, rng: np.random.Generator
+) -> None:
+    """Counted by the extension of the oil spring it had no length where 1/k = 0, and was a free play by its numbers."""
+    values = {"frame_compliance": {"d_f": 2e-3, "F_f": 500.0}, "cavitation": {"d_c": 2e-3, "F_c": 500.0}}[name]
+    truth = Damper(base=tuple(row.model_copy(update={"k_N_per_m": k}) for row in damper_of(TWO).base))
+    records = sines(truth.with_effect(name, values), rng, TWO, tests=SEVERAL, noise=3e-3, cycles=4)
+    found = diagnosed(records, forbid=all_but(name, "lash", "rounded_yield", "gas_spring"))
+    told = found.diagnosis
+    assert (told.verdict, told.effects, told.rivals) == ("named", (name,), ()), told.reason
+    assert found.damper.effects[name] == pytest.approx(values, rel=0.02)
 
 
 def test_a_pocket_is_searched_to_the_end_of_its_valley_where_the_weights_change(rng: np.random.Generator) -> None:

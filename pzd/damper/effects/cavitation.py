@@ -41,13 +41,18 @@ EFFECT = Effect(
             "length of the pocket; above 0 it is squeezed in rebound, below in compression",
             Search(lambda s: s.stroke, (0.05, -0.05)),
         ),
-        Parameter("F_c", "N", 1.0e3, 1.0e-3, 1.0e9, "its pressure times the area: half of it is left there", _F_C_SEARCH),
+        Parameter(
+            "F_c", "N", 1.0e3, 1.0e-3, 1.0e9, "its pressure times the area: half of it is left there", _F_C_SEARCH
+        ),
     ),
     source="Boyle's law of a pocket in series with the oil; late filling: Duym, Stiens and Reybrouck 1997, Vehicle "
     "System Dynamics 27",
     tests=(
         ({"deflection": 0.004, "side": 1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, 0.0025615528128088303),
-        ({"deflection": 0.001, "side": 1.0, "k": 2e5, "d_c": 0.001, "F_c": 200.0}, 0.0006180339887498949),  # golden section
+        (
+            {"deflection": 0.001, "side": 1.0, "k": 2e5, "d_c": 0.001, "F_c": 200.0},
+            0.0006180339887498949,
+        ),  # golden section
         ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": -0.002, "F_c": 200.0}, -0.0025615528128088303),
         ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, -0.004),
     ),

@@ -44,7 +44,10 @@ EFFECT = Effect(
     "form",
     tests=(
         ({"deflection": 0.004, "side": 1.0, "k": 2e5, "d_f": 0.002, "F_f": 200.0}, 0.0025615528128088303),
-        ({"deflection": -0.001, "side": -1.0, "k": 2e5, "d_f": 0.001, "F_f": 200.0}, -0.0006180339887498949),  # golden section
+        (
+            {"deflection": -0.001, "side": -1.0, "k": 2e5, "d_f": 0.001, "F_f": 200.0},
+            -0.0006180339887498949,
+        ),  # golden section
     ),
     nearly=lambda values, beside: soft_play(values["d_f"], values["F_f"], beside),
     order=2,  # behind a free play, and a pocket

@@ -614,5 +614,3 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
     weights[0] /= np.sqrt(2.0)
     nothing = MarginalisedNuisances.none(2 * weights.size - 1)
     return replace(weighed, weights=weights, nuisances=nothing, delay_s=0.0)
-
-
