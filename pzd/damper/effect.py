@@ -14,8 +14,8 @@ material
     `friction_factor`, `damping_factor`, `stiffness_factor`: factors on T0, C and k by the recorded temperature.
 stroke
     `law`: the extension of the oil stiffness, F = k extension, by the elastic deflection x - y, its side (+1 or -1)
-    and k, rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force there.
-    Whatever is in series with the oil stiffness and gives by the force alone has its place here: late filling, a
+    and k, rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force
+    there. Whatever is in series with the oil stiffness and gives by the force alone has its place here: late filling, a
     compliant frame or mount, a gas volume that is compressed (accumulator, cavitation without its history).
 flow
     One or more changes of the curve that gives the force by the flow speed w = |dy/dt| >= 0:

@@ -277,7 +277,7 @@ def test_marginalised_residuals_have_the_likelihood_of_their_covariance(
 
 
 def test_of_two_groups_of_nuisances_the_likelihood_is_that_of_all(rng: np.random.Generator) -> None:
-    """Columns of single samples, some of which overlap, are integrated out cluster by cluster, and before the others."""
+    """Columns of single samples, some of which overlap, are integrated out by clusters, and before the others."""
     V, local, r = dense(rng), sparse(rng), rng.standard_normal((RESIDUALS, 4))
     local[:, 3:9] += np.roll(local[:, 3:9], 2, axis=0)
     left = MarginalisedNuisances.from_columns(V, csr_array(local)).marginalised(r)

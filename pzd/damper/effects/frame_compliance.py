@@ -3,10 +3,10 @@
 Law: F = k e, x - y = e + d_f F/(|F| + F_f): a mount of stiffness k_f = F_f/d_f at no force that hardens and gives d_f
 at most to either side. The oil may be rigid beside it, 1/k = 0. A linear frame is left out, for no test distinguishes
 it from a softer k: with e = F/k and x - y = F/k + F/k_f, F = k k_f/(k + k_f) (x - y), at every voltage; where it
-carries the parallel forces as well, it belongs to the stand. Range: d_f 0.1-3 mm. Its nearest neighbours are `lash`, and a smaller k. A stroke so short that
-nothing slips distinguishes it from both: free play carries no force there, a linear spring is as stiff at twice the
-stroke, and this one hardens. `cavitation` hardens to one side alone. A mount that gives way at once is a `lash`, and
-named so.
+carries the parallel forces as well, it belongs to the stand. Range: d_f 0.1-3 mm. Its nearest neighbours are `lash`,
+and a smaller k. A stroke so short that nothing slips distinguishes it from both: free play carries no force there, a
+linear spring is as stiff at twice the stroke, and this one hardens. `cavitation` hardens to one side alone. A mount
+that gives way at once is a `lash`, and named so.
 """
 
 from __future__ import annotations

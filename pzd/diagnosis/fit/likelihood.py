@@ -52,9 +52,9 @@ Reason: it would change the misfit by a millionth."""
 class MarginalisedNuisances:
     """Nuisances of a test with Gaussian priors, integrated out of the residuals.
 
-    Those of single samples, as beside a jump, overlap only where they are neighbours: they go first, cluster by cluster.
+    Those of single samples, as beside a jump, overlap only where they are neighbours: they go first, by clusters.
 
-    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R';
+    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r, M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R', V' V = R diag(s^2) R';
     of two groups r' = S_2 S_1 r, S_1 of the first alone, S_2 of the second behind it, S_1 V_2: |r'|^2 is the same
                                                                             Source: Gaussian prior, marginal likelihood
 
