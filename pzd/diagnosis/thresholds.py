@@ -103,10 +103,6 @@ END_STOP_BEGINS = 0.4
 """Share of the half stroke about its middle within which no end stop begins.
 
 Reason: stops act over the last 10 to 30 % of the stroke, a soft rubber one over half of it."""
-END_STOP_OTHER_SIDE = 0.1
-"""Share of its force at one end of the stroke that a stop must reach at the other end.
-
-Reason: a stop at one end alone looks like a stroke that is recorded off its middle; not tuned."""
 HALVES_SIGNIFICANCE = 0.001
 """Probability by chance below which halves of the tests disagree about a parameter.
 

@@ -25,7 +25,9 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"d_c": end * s, "F_c": pressure}
 
 
-_F_C_SEARCH = Search(lambda s: s.force, (0.1, 1.0), logarithmic=True)
+STRAIGHT = 10.0
+"""Multiple of the largest force from which on F_d is not searched: what is squeezed by a tenth is a linear spring."""
+_F_C_SEARCH = Search(lambda s: s.force, (0.1, 1.0), logarithmic=True, within=(0.0, STRAIGHT))
 
 EFFECT = Effect(
     name="cavitation",

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.effects.cavitation import deflection_with, extension_behind, extension_slope, soft_play
+from pzd.damper.effects.cavitation import STRAIGHT, deflection_with, extension_behind, extension_slope, soft_play
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -37,7 +37,7 @@ EFFECT = Effect(
             1.0e-3,
             1.0e9,
             "force at which it has given half of that",
-            Search(lambda s: s.force, (0.1, 1.0), logarithmic=True),
+            Search(lambda s: s.force, (0.1, 1.0), logarithmic=True, within=(0.0, STRAIGHT)),
         ),
     ),
     source="Mindlin 1945, Bell System Technical Journal 24: a cushion that gives at most its own height, in rational "

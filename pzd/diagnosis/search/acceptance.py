@@ -54,11 +54,11 @@ def _misplaced(candidate: Candidate, stroke: float) -> str | None:
 
 
 def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
-    """Say why an end stop is none by where it begins; None where that is near both ends of the half stroke [m]."""
+    """Say why an end stop is none by where it begins; None where that is near an end of the half stroke [m].
+
+    At one end alone it is one: a bump stop, or a stroke that is off the middle.
+    """
     begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
-    further, nearer = (stroke - float(np.max(begins)) + side * abs(damper.zero_m) for side in (1.0, -1.0))
-    if nearer <= 0.0 or nearer**2 < thresholds.END_STOP_OTHER_SIDE * further**2:
-        return "stand-in: acts at one end of the stroke alone"
     if float(np.min(begins)) - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
     return None
