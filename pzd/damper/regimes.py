@@ -239,6 +239,15 @@ def row_in(step: TimeStep, at: float) -> Row:
 
 
 @inlined
+def about(step: TimeStep, at: float, span: float) -> tuple[float, float]:
+    """Return two moments [s] a span to either side; inside the step where k would be extrapolated below zero."""
+    before, after = at - span, at + span
+    if min(row_in(step, before)[K], row_in(step, after)[K]) > 0.0:
+        return before, after
+    return max(before, 0.0), min(after, step.h)
+
+
+@inlined
 def extension_speed(step: TimeStep, at: float) -> float:
     """Interpolate dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
@@ -316,9 +325,9 @@ def _slopes(
         if explicit:
             return by_y, (step.u1 - step.u0) / step.h
         return by_y, (_rate(y, w, at + dt, regime, side, step, explicit) - rate) / dt  # linear in time
-    span = _SECOND_DIFFERENCE * step.h
-    ahead = _rate(y, w, at + span, regime, side, step, explicit)
-    return by_y, (ahead - _rate(y, w, at - span, regime, side, step, explicit)) / (2.0 * span)
+    before, after = about(step, at, _SECOND_DIFFERENCE * step.h)
+    ahead = _rate(y, w, after, regime, side, step, explicit)
+    return by_y, (ahead - _rate(y, w, before, regime, side, step, explicit)) / (after - before)
 
 
 @compiled
@@ -354,10 +363,10 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep
     if bent:
         rate = _behind_stroke(rate, flow.smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
-        span = _DIFFERENCE * step.h
-        ahead = flow.smooth_force_of(s, row_in(step, at + span), side)
-        behind = flow.smooth_force_of(s, row_in(step, at - span), side)
-        rate += softening * flow.smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
+        before, after = about(step, at, _DIFFERENCE * step.h)
+        ahead = flow.smooth_force_of(s, row_in(step, after), side)
+        behind = flow.smooth_force_of(s, row_in(step, before), side)
+        rate += softening * flow.smooth_force_of(s, p, side) - (ahead - behind) / (after - before)
     return rate / flow.smooth_rise(w, p, side)
 
 
@@ -370,10 +379,10 @@ def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, st
     e = deflection_on(force, p, side)
     rate *= kernels.stroke_slope(e, side, p)
     if step.moving:
-        span = _DIFFERENCE * step.h
-        ahead = kernels.stroke_law(e, side, row_in(step, at + span))
-        behind = kernels.stroke_law(e, side, row_in(step, at - span))
-        rate += p[K] * side * (ahead - behind) / (2.0 * span)
+        before, after = about(step, at, _DIFFERENCE * step.h)
+        ahead = kernels.stroke_law(e, side, row_in(step, after))
+        behind = kernels.stroke_law(e, side, row_in(step, before))
+        rate += p[K] * side * (ahead - behind) / (after - before)
     return rate
 
 

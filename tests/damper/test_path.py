@@ -131,6 +131,19 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("effects", FLOWS, ids="+".join)
+def test_an_oil_spring_that_is_a_thousand_times_as_stiff_a_sample_later_gives_a_force(effects: dict) -> None:
+    """Linear over the step, k was extrapolated below zero before it: a search crashed with what came of it."""
+    rows = tuple(row.model_copy(update={"k_N_per_m": k}) for row, k in zip(PLAIN.base, (1e5, 5e9), strict=True))
+    damper = with_effects(effects).model_copy(update={"base": rows})
+    motion = sine(np.where(TIME < 0.3, 1e-3, 150.0), 4.0, 0.015)
+    settled = sine(150.0, 4.0, 0.015)
+    late = TIME > 0.3 + 0.25  # a quarter period has passed, and with it what was stored
+    force = respond(damper, motion)
+    assert np.all(np.isfinite(force))
+    np.testing.assert_allclose(force[late], respond(damper, settled)[late], rtol=0, atol=1e-3 * np.max(np.abs(force)))
+
+
+@pytest.mark.parametrize("effects", FLOWS, ids="+".join)
 @pytest.mark.parametrize("voltage", [60.0, "moving"])
 def test_agrees_with_an_independent_solver(effects: dict, voltage: float | str) -> None:
     motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME) if voltage == "moving" else voltage, 4.0, 0.015)

@@ -261,9 +261,7 @@ def test_a_stop_at_one_end_of_an_absolute_displacement_is_found_where_it_is(rng:
         (0.014, 0.004, "in the middle"),
     ],
 )
-def test_an_end_stop_acts_near_an_end_of_a_recorded_stroke_of_60_mm(
-    x_e: float, zero: float, why: str | None
-) -> None:
+def test_an_end_stop_acts_near_an_end_of_a_recorded_stroke_of_60_mm(x_e: float, zero: float, why: str | None) -> None:
     damper = damper_of((0.0,), end_stop={"k_e": 1e6, "x_e": x_e}).moved(zero)
     found = misplaced_end_stop(damper, 0.03)
     assert found is None if why is None else found is not None and why in found
