@@ -46,6 +46,8 @@ from pzd.diagnosis.changes.selection import Search
 from pzd.diagnosis.changes.state import State, about, diagnosed_state
 from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
@@ -337,6 +339,26 @@ def _farther(away: float, carried: Missed) -> float:
     return float(np.sqrt(away / carried.away))
 
 
+# --- Tests that have no average cycle
+
+
+def _not_averaged(state: State) -> list[PreparedRecord]:
+    """Return the tests in which the control signal moves, or no cycle repeats."""
+    names = {test.record.name for test in averaged(state.prepared)}
+    return [p for p in state.prepared if p.record.name not in names]
+
+
+def _missed_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
+    """Return the share of the force (r.m.s.) that a damper misses in some tests, as they were run; None of none."""
+    missed = total = 0.0
+    for test in tests:
+        counted_samples = comparable_samples(test)
+        force = test.record.force[counted_samples]
+        missed += float(np.sum((force - predicted_force(damper, test)[counted_samples]) ** 2))
+        total += float(np.sum(force**2))
+    return float(np.sqrt(missed / total)) if total > 0.0 else None
+
+
 # --- What is found
 
 
@@ -380,6 +402,9 @@ class Findings:
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
+        reason = self._reason(verdict, listed, others, difference)
+        if verdict == "unchanged" and (beside := self._left_out_differs()):
+            verdict, reason = "unexplained", [*reason, beside]
         return Changes(
             verdict=verdict,
             from_=self.before.name,
@@ -389,7 +414,7 @@ class Findings:
             changes=tuple(listed),
             unchanged=self._unchanged(best),
             rivals=tuple(told),
-            reason=self._reason(verdict, listed, others, difference),
+            reason="; ".join(reason),
             next_test=self._next_test(best, rivals),
         )
 
@@ -430,6 +455,21 @@ class Findings:
         if perhaps := self.search.perhaps(best):
             rivals[NOTHING] = perhaps
         return best, rivals
+
+    def _left_out_differs(self) -> str | None:
+        """Say by how much worse the first damper predicts the tests that are not compared; None where it does not.
+
+        What is seen where the control signal moves alone, as a lag of the valve, changes no average cycle.
+        """
+        tests = [_not_averaged(state) for state in (self.before, self.after)]
+        own, other = (_missed_share(self.first.damper, each) for each in tests)
+        if own is None or other is None or other <= BEYOND_TESTED * own + self.diagnose.visible:
+            return None
+        return (
+            f"but of the tests left out the damper of {self.before.name} misses {100.0 * other:.2g} % in "
+            f"{self.after.name} and {100.0 * own:.2g} % in {self.before.name} (r.m.s., of the force): what changed "
+            "shows there alone, and has no name"
+        )
 
     def _stands_out(self, best: Fitted, candidate: Candidate) -> bool:
         """Whether a change makes more than what is left without a name, which may be of the same cause."""
@@ -663,7 +703,7 @@ class Findings:
 
     def _reason(
         self, verdict: Verdict, listed: Sequence[Change], rivals: dict[str, list[str]], difference: Difference
-    ) -> str:
+    ) -> list[str]:
         of_damper = list(dict.fromkeys(c.name for c in listed if c.of == "damper"))
         of_stand = list(dict.fromkeys(c.name for c in listed if c.of == "stand"))
         size = f"the force differs by {_digits(difference.rms_N)} N r.m.s."
@@ -693,9 +733,15 @@ class Findings:
         told.extend(
             f"{counted(out, 'test')} of {state.name} left out: the control signal moves, or no cycle repeats"
             for state in (self.before, self.after)
-            if (out := len(state.prepared) - len(averaged(state.prepared)))
+            if (out := len(_not_averaged(state)))
         )
-        return "; ".join(told)
+        compared = {c.after for c in self.comparisons}
+        if out := sum(test.record.name not in compared for test in averaged(self.after.prepared)):
+            told.append(
+                f"{counted(out, 'test')} of {self.after.name} left out: {self.before.name} was not tested at such a "
+                "control signal or temperature"
+            )
+        return told
 
     def cycles(self) -> tuple[ComparedCycle, ...]:
         """Return the compared cycles over their phase, with the difference that the changes make."""

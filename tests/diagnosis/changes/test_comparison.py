@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from states import SPEED, campaign, drawn_damper, found, inside, likelihood_between, names, names_told, scaled
 
+from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.fit.intervals import LEVEL
 from pzd.record import Record
@@ -257,6 +259,36 @@ def test_a_stop_stands_where_it_is_whatever_middle_the_tests_have(rng: np.random
     assert names(changes) == ["end_stop"]
     to = {c.parameter: c.to for c in changes.changes}
     assert to == pytest.approx(values, rel=0.1)
+
+
+def stepped(damper: Damper, rng: np.random.Generator, frequency: float) -> Record:
+    """A sine in which the control signal steps."""
+    time, w = np.arange(0.0, 6.0, 1.0 / 500.0), 2.0 * np.pi * frequency
+    x, v, a = 0.02 * np.sin(w * time), 0.02 * w * np.cos(w * time), -0.02 * w**2 * np.sin(w * time)
+    voltage = np.where(time % 1.7 < 0.8, 0.0, 100.0)
+    force = respond(damper, Motion(time, x, v, a, voltage))
+    noise = 0.003 * float(np.max(np.abs(force))) * rng.standard_normal(time.size)
+    return Record(f"steps at {frequency:g} Hz", None, time, x, v, a, force + noise, voltage)
+
+
+@pytest.mark.parametrize(("lag", "verdict"), [(0.0, "unchanged"), (0.05, "unexplained")])
+def test_what_shows_only_where_the_control_signal_moves_is_not_called_unchanged(
+    lag: float, verdict: str, rng: np.random.Generator
+) -> None:
+    """No average cycle knows of a valve that became slow."""
+    damper = drawn_damper(rng)
+    slower = damper.with_effect("valve_lag", {"tau": lag}) if lag else damper
+    after = [*campaign(damper, rng), stepped(slower, rng, 1.4)]
+    changes = found([*campaign(damper, rng), stepped(damper, rng, 1.0)], after)
+    assert (changes.verdict, names(changes)) == (verdict, []), changes.reason
+    assert ("of the tests left out" in changes.reason) == (verdict == "unexplained")
+
+
+def test_a_test_at_a_control_signal_that_the_first_state_has_not_seen_is_told(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng, voltages=(0.0, 50.0, 100.0))
+    before = [r for r in campaign(damper, rng) if r.median_voltage() != 50.0]
+    changes = found(before, campaign(damper, rng))
+    assert "3 tests of aged left out: new was not tested at such a control signal" in changes.reason
 
 
 def test_a_test_in_which_the_control_signal_moves_is_left_out_and_told(rng: np.random.Generator) -> None:
