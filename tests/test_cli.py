@@ -815,6 +815,13 @@ def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
     assert diagnosis_lines(bare, Control())[0].startswith("verdict: unexplained, a gap that repeats")
 
 
+def test_the_headline_of_a_doubtful_verdict_does_not_say_that_nothing_else_fits() -> None:
+    for verdict, sure in (("named", "no other does"), ("none", "nothing is missing")):
+        told = diagnosis().model_copy(update={"verdict": verdict, "support": {}})
+        assert sure in headline(told.model_copy(update={"confidence": 0.95}))
+        assert sure not in headline(told.model_copy(update={"confidence": 0.02}))
+
+
 def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
     value = Value(value=(1.0, 2.0), low95=(0.9, 1.9), high95=(1.1, 2.1), unit="N", at_voltage_V=(0.0, 150.0))
     told = diagnosis_lines(

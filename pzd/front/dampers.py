@@ -156,7 +156,8 @@ class Damper(Result):
         displacement : (n,) extension [m]
         voltage : control signal, a number or (n,); may be left out where the damper was identified at a single one
         temperature : a number or (n,) [degC]; by default the lowest at which the damper is known
-        velocity : (n,) rate of extension [m/s]; by default from the displacement, as for a record
+        velocity : (n,) rate of extension [m/s]; without it the displacement is taken as measured: it is cleaned of its
+            noise, and the rate comes of it, as for a record
 
         Returns
         -------
@@ -188,7 +189,10 @@ class Damper(Result):
         channels = [
             self._channel(name, value, t.size) for name, value in (("voltage", voltage), ("temperature", temperature))
         ]
-        return Motion(t, x, clean.velocity if v is None else v, clean.acceleration, *channels)
+        if v is not None:  # a motion that is known
+            return Motion(t, x, v, clean.acceleration, *channels)
+        # A stiff oil spring turns micrometres of noise into newtons.
+        return Motion(t, clean.displacement, clean.velocity, clean.acceleration, *channels)
 
     @in_python
     def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:

@@ -27,6 +27,11 @@ _VERDICTS = {
     "none": "nothing is missing that the data can show",
     "unexplained": "a gap that repeats remains, and no name accounts for it",
 }
+_DOUBTFUL = {
+    "named": "one answer fits, and these tests do not exclude something beside it",
+    "none": "nothing stands out of the noise, and these tests do not exclude that something is missing",
+}
+"""The same where the confidence says so."""
 _MOST = 3
 """How many regions and candidates are listed."""
 _MOST_SHAPES = 2
@@ -76,13 +81,17 @@ def diagnosis_lines(
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in words: what is known of the parts first where the whole is unexplained."""
+    from pzd.diagnosis.thresholds import DOUBTFUL_BELOW
+
     supported = [
         (name.replace("_", " "), each, f"({each.share:.0%} of the gap comes back without it)")
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
-        if (_predicts(each) if each.added else each.sure != "open") and each.share >= _LEAST_SHARE
+        if (_predicts(each, DOUBTFUL_BELOW) if each.added else each.sure != "open") and each.share >= _LEAST_SHARE
     ]
     known = ", ".join(f"{name} is {each.sure} {share}" for name, each, share in supported if not each.added)
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
+    if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and diagnosis.confidence < DOUBTFUL_BELOW:
+        return _DOUBTFUL[diagnosis.verdict]
     if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
     predict = "predicts, whatever it stands for" if len(useful) == 1 else "predict, whatever they stand for"
@@ -91,11 +100,9 @@ def headline(diagnosis: Diagnosis) -> str:
     return f"but {'; '.join(words)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
 
 
-def _predicts(each: Support) -> bool:
-    """Whether what was added for its prediction is likely to predict other tests better."""
-    from pzd.diagnosis.thresholds import DOUBTFUL_BELOW
-
-    return each.confidence is not None and each.confidence >= DOUBTFUL_BELOW
+def _predicts(each: Support, from_: float) -> bool:
+    """Whether what was added for its prediction predicts other tests better with such a confidence."""
+    return each.confidence is not None and each.confidence >= from_
 
 
 def _open_names(diagnosis: Diagnosis) -> str:

@@ -308,6 +308,19 @@ def test_the_curve_is_the_law_and_the_force_of_a_slow_motion_follows_it(hidden: 
     assert force[-1] == pytest.approx(expected[2], rel=1e-6)
 
 
+@pytest.mark.parametrize("stiffness", [2e5, 2e6, 2e7])
+def test_the_noise_of_a_displacement_is_no_motion_of_a_stiff_oil_spring(
+    stiffness: float, rng: np.random.Generator
+) -> None:
+    """10 um of it moved a spring of 2e6 N/m by 20 N, and the force of a test was predicted worse than it was known."""
+    damper = pzd.Damper({"T0_N": 80.0, "C_Ns_per_m": 1500.0, "k_N_per_m": stiffness})
+    time = np.arange(4000) / 500.0
+    x, v = 0.012 * np.sin(4.0 * np.pi * time), 0.012 * 4.0 * np.pi * np.cos(4.0 * np.pi * time)
+    known, measured = damper.force(time, x, velocity=v), damper.force(time, x + 1e-5 * rng.standard_normal(time.size))
+    settled = slice(500, None)
+    assert np.sum((measured - known)[settled] ** 2) < 3e-4 * np.sum(known[settled] ** 2)
+
+
 def test_a_voltage_may_be_a_number_or_move_and_must_be_given_where_it_matters(hidden: pzd.Damper) -> None:
     time = np.arange(1000) / 500.0
     x = 0.01 * np.sin(2.0 * np.pi * time)
