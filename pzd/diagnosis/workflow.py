@@ -165,7 +165,7 @@ def _next_test(
 
 
 def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
-    """List every candidate at the step that decided on it, best first, adopted ones in front.
+    """List every candidate at the step that decided on it, best first, adopted ones in front, as they are handed on.
 
     `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in; its standard error is that of the
     scatter between tests.
@@ -177,12 +177,13 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
                 continue
             reason = "does not pay" if c.delta_bic > 0.0 else "explains less"
             reason = selection.reasons.get(c.effect, reason if c.searched else "promises too little to be searched for")
-            damper = selection.fitted.damper if c.effect in selection.adopted else c.fitted.damper
-            values: dict[str, Any] = dict(damper.effects[c.effect])
+            # A later step, an exchange or the last descent moved what was adopted from where its own step left it.
+            fitted = selection.fitted if c.effect in selection.adopted else c.fitted
+            values: dict[str, Any] = dict(fitted.damper.effects[c.effect])
             rows[c.effect] = Ranked(
                 effect=c.effect,
-                gap_after=evidence.criterion(c.fitted),
-                gap_standard_error=evidence.criterion_error(c.fitted),
+                gap_after=evidence.criterion(fitted),
+                gap_standard_error=evidence.criterion_error(fitted),
                 delta_bic=round(c.delta_bic, 3),
                 at_voltage_V=values.pop("at_voltage_V", None),
                 parameters=values,
