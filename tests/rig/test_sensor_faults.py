@@ -174,6 +174,15 @@ def test_a_control_signal_that_drops_out_stays_one_condition(
     assert moving == ()
 
 
+def test_a_temperature_that_flickers_between_two_steps_drops_out_nowhere(rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        warming = 26.0 + 4.0 * record.time / record.time[-1] + 0.04 * one.standard_normal(record.time.size)
+        assert not sizes([replace(record, temperature=np.round(warming, 1))], dropouts)
+        lost = np.where(np.arange(record.time.size) % 400 < 3, 0.0, np.round(warming, 1))
+        assert sizes([replace(record, temperature=lost)], dropouts)
+
+
 @pytest.mark.parametrize("gain", [0.6, 0.92, 1.08])
 def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rng: np.random.Generator) -> None:
     told = 0

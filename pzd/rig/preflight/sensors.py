@@ -10,6 +10,7 @@ from pzd.artefacts import Finding
 from pzd.record import Array, Rows
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
+from pzd.signals.measures import resolution
 
 # --- Steps of a converter ---
 
@@ -116,7 +117,9 @@ AROUND = 25
 OFF = 8.0
 """Robust standard deviations by which it lies off the line through its neighbours,"""
 OFF_SHARE = 0.02
-"""and this share of the channel's range."""
+"""and this share of the channel's range,"""
+STEPS_OFF = 1.5
+"""and so many steps of what it is recorded in: between two of them a slow channel flickers."""
 
 
 def dropouts(test: PreflightRecord) -> Iterator[Finding]:
@@ -148,16 +151,17 @@ def _dropped(values: Array) -> Rows:
         return none
     found = [none]
     for level in often:
+        flicker = STEPS_OFF * resolution(values[values != level])
         rows = np.flatnonzero(values == level)
         runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-        kept = [run for run in runs if run.size <= LONGEST_DROP and _stands_away(values, run)]
+        kept = [run for run in runs if run.size <= LONGEST_DROP and _stands_away(values, run, flicker)]
         if len(kept) >= LEAST_DROPS:
             found.append(np.concatenate(kept))
     return max(found, key=lambda rows: rows.size)
 
 
-def _stands_away(values: Array, run: Rows) -> bool:
-    """Whether a run of samples lies off what the samples to either side make of a line."""
+def _stands_away(values: Array, run: Rows, least: float) -> bool:
+    """Whether a run of samples lies off what the samples to either side make of a line, by so much at least."""
     first, last = int(run[0]), int(run[-1])
     rows = np.r_[max(first - AROUND, 0) : first, last + 1 : min(last + 1 + AROUND, values.size)]
     rows = rows[values[rows] != values[first]]
@@ -168,8 +172,7 @@ def _stands_away(values: Array, run: Rows) -> bool:
     line = np.polyfit(near - first, values[near], 1)
     rough = float(np.abs(values[near] - np.polyval(line, near - first)).max())
     off = float(np.abs(values[run] - np.polyval(line, run - first)).min())
-    least = max(3.0 * rough, OFF * _noise(values[rows]), OFF_SHARE * float(np.ptp(values)))
-    return off > least
+    return off > max(least, 3.0 * rough, OFF * _noise(values[rows]), OFF_SHARE * float(np.ptp(values)))
 
 
 def _noise(values: Array) -> float:
