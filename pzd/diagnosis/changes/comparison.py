@@ -714,6 +714,11 @@ class Findings:
             told.append(f"of the damper: {', '.join(of_damper)}")
         elif verdict == "unchanged":
             told.append("nothing of the damper changed visibly")
+            if (hidden := self.search.hidden(self.best)) > self.diagnose.visible:
+                told.append(
+                    f"less than {100.0 * hidden:.2g} % of peak would not be seen, since the damper of "
+                    f"{self.before.name} misses as much"
+                )
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
         for name, others in rivals.items():

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from states import SPEED, campaign, drawn_damper, found, inside, likelihood_between, names, names_told, scaled
+from states import MOTIONS, SPEED, campaign, drawn_damper, found, inside, likelihood_between, names, names_told, scaled
 
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
@@ -282,6 +282,19 @@ def test_what_shows_only_where_the_control_signal_moves_is_not_called_unchanged(
     changes = found([*campaign(damper, rng), stepped(damper, rng, 1.0)], after)
     assert (changes.verdict, names(changes)) == (verdict, []), changes.reason
     assert ("of the tests left out" in changes.reason) == (verdict == "unexplained")
+
+
+def test_how_small_a_change_would_be_hidden_by_what_the_damper_misses_is_told(rng: np.random.Generator) -> None:
+    """A spring that hardens with the cube is in no library; beside another motion it is no change, and hides one."""
+    damper, other = drawn_damper(rng), ((0.7, 0.025), (1.6, 0.012), (2.6, 0.024))
+
+    def hardening(size: float, motions: tuple[tuple[float, float], ...]) -> list[Record]:
+        return [replace(r, force=r.force + size * (r.displacement / 0.03) ** 3) for r in campaign(damper, rng, motions)]
+
+    plain, hard = (found(hardening(size, MOTIONS), hardening(size, other)) for size in (0.0, 60.0))
+    assert plain.verdict == hard.verdict == "unchanged"
+    assert "would not be seen" not in plain.reason
+    assert "of peak would not be seen, since the damper of new misses as much" in hard.reason
 
 
 def test_a_test_at_a_control_signal_that_the_first_state_has_not_seen_is_told(rng: np.random.Generator) -> None:
