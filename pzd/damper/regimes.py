@@ -242,7 +242,8 @@ def row_in(step: TimeStep, at: float) -> Row:
 def about(step: TimeStep, at: float, span: float) -> tuple[float, float]:
     """Return two moments [s] a span to either side; inside the step where k would be extrapolated below zero."""
     before, after = at - span, at + span
-    if min(row_in(step, before)[K], row_in(step, after)[K]) > 0.0:
+    p, q = row_in(step, before), row_in(step, after)
+    if p[K] > 0.0 and q[K] > 0.0:
         return before, after
     return max(before, 0.0), min(after, step.h)
 

@@ -28,6 +28,7 @@ POINTS = 400
 QUANTITIES = {
     **dict.fromkeys(("effective", "before", "now"), (-200.0, 200.0)),
     **dict.fromkeys(("deflection", "extension", "travel", "x"), (-0.02, 0.02)),
+    "k": (1e4, 1e9),
     **dict.fromkeys(("T0", "force", "viscous"), (0.0, 5000.0)),
     "w": (0.0, 3.0),
     "v": (-3.0, 3.0),
@@ -50,7 +51,7 @@ def given(effect: Effect, law: Callable[..., float], rng: np.random.Generator) -
     for name in inspect.signature(law).parameters:
         if name == "side":
             found[name] = float(rng.choice([-1.0, 1.0]))
-        elif name == "C":
+        elif name in ("C", "k"):
             found[name] = float(rng.uniform(*QUANTITIES[name]))  # of a path, never 0
         elif name in QUANTITIES:
             found[name] = float(rng.choice([0.0, rng.uniform(*QUANTITIES[name])], p=[0.05, 0.95]))
