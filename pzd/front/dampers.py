@@ -32,6 +32,8 @@ _DRAWN = 401
 """Velocities of a drawn curve, evenly spaced: 0 is one of them."""
 _FASTEST = 1.0
 """Up to which speed a curve is drawn where nothing was tested [m/s]."""
+_BEYOND_NOISE = 8.0
+"""Standard deviations by which noise moves no sample of a displacement: not one in a billion, if it is normal."""
 
 
 class Damper(Result):
@@ -157,7 +159,7 @@ class Damper(Result):
         voltage : control signal, a number or (n,); may be left out where the damper was identified at a single one
         temperature : a number or (n,) [degC]; by default the lowest at which the damper is known
         velocity : (n,) rate of extension [m/s]; without it the displacement is taken as measured: it is cleaned of its
-            noise, and the rate comes of it, as for a record
+            noise, where that leaves no step or corner out, and the rate comes of it, as for a record
 
         Returns
         -------
@@ -177,6 +179,7 @@ class Damper(Result):
         from pzd.record import clock_fault
         from pzd.signals.cycles import cycles
         from pzd.signals.kinematics import kinematics
+        from pzd.signals.measures import noise_beside_motion
 
         t = numbers("time", time)
         if t.size < 2:
@@ -191,8 +194,10 @@ class Damper(Result):
         ]
         if v is not None:  # a motion that is known
             return Motion(t, x, v, clean.acceleration, *channels)
-        # A stiff oil spring turns micrometres of noise into newtons.
-        return Motion(t, clean.displacement, clean.velocity, clean.acceleration, *channels)
+        # A stiff oil spring turns micrometres of noise into newtons; but a step is none, though cleaning rounds it off.
+        left = float(np.max(np.abs(x - clean.displacement)))
+        kept = x if left > _BEYOND_NOISE * noise_beside_motion(x) else clean.displacement
+        return Motion(t, kept, clean.velocity, clean.acceleration, *channels)
 
     @in_python
     def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:

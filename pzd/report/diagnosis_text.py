@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         Prediction,
         Value,
     )
-    from pzd.artefacts.diagnosis import Support
     from pzd.quantities import Control
 
 _VERDICTS = {
@@ -81,16 +80,14 @@ def diagnosis_lines(
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in words: what is known of the parts first where the whole is unexplained."""
-    from pzd.diagnosis.thresholds import DOUBTFUL_BELOW
-
     supported = [
         (name.replace("_", " "), each, f"({each.share:.0%} of the gap comes back without it)")
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
-        if (_predicts(each, DOUBTFUL_BELOW) if each.added else each.sure != "open") and each.share >= _LEAST_SHARE
+        if (_confident(each.confidence) if each.added else each.sure != "open") and each.share >= _LEAST_SHARE
     ]
     known = ", ".join(f"{name} is {each.sure} {share}" for name, each, share in supported if not each.added)
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
-    if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and diagnosis.confidence < DOUBTFUL_BELOW:
+    if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and not _confident(diagnosis.confidence):
         return _DOUBTFUL[diagnosis.verdict]
     if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
@@ -100,9 +97,11 @@ def headline(diagnosis: Diagnosis) -> str:
     return f"but {'; '.join(words)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
 
 
-def _predicts(each: Support, from_: float) -> bool:
-    """Whether what was added for its prediction predicts other tests better with such a confidence."""
-    return each.confidence is not None and each.confidence >= from_
+def _confident(confidence: float | None) -> bool:
+    """Whether a confidence was stated, and leaves no doubt of the verdict or the prediction that it is of."""
+    from pzd.diagnosis.thresholds import DOUBTFUL_BELOW
+
+    return confidence is not None and confidence >= DOUBTFUL_BELOW
 
 
 def _open_names(diagnosis: Diagnosis) -> str:

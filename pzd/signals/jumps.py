@@ -13,7 +13,7 @@ import numpy as np
 
 from pzd.record import Array, Mask
 from pzd.signals.cycles import Cycles
-from pzd.signals.measures import reversals
+from pzd.signals.measures import MAD_TO_SIGMA, noise_beside_motion, reversals
 
 # --- Jumps of the force ---
 
@@ -25,8 +25,6 @@ MOST_IN_SAMPLES = 150
 """Most samples beside jumps in a record compared sample by sample, which has as many jumps as reversals."""
 SAMPLES_PER_REVERSAL = 4
 """Samples beside the jump of a dry friction: two, and one at either end that it reaches through a filter."""
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of Gaussian scatter over its median magnitude."""
 
 
 def jumps(force: Array, most: int = MOST_SUDDEN, *, closed: bool = False) -> Array:
@@ -98,7 +96,7 @@ def unresolved_flanks(force: Array, turns: Sequence[int], rate: float) -> Mask:
     (n,) mask
     """
     found = np.zeros(force.size, dtype=np.bool_)
-    noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(force, 2)))) / np.sqrt(6.0) if force.size > 2 else 0.0
+    noise = noise_beside_motion(force)
     reach = int(np.ceil(FLANK_LATE * rate)) + 2
     for turn in turns:
         low, high = max(turn - reach, 0), min(turn + reach + 1, force.size)

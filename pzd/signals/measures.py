@@ -136,6 +136,18 @@ WHOLE_STEPS = 0.05
 """Largest median distance of the steps of a quantised channel from a whole number of the least one."""
 
 
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+def noise_beside_motion(values: Array) -> float:
+    """Estimate the standard deviation of white noise in a channel (n,), in its unit; 0 of fewer than three samples.
+
+    Equation: 1.4826 median |second difference| / sqrt(6), which a smooth motion hardly has, and a step seldom
+    """
+    return MAD_TO_SIGMA * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if values.size > 2 else 0.0
+
+
 @found_once
 def resolution(values: Array) -> float:
     """Return the step in whole numbers of which a channel (n,) is recorded, in its unit; 0 where it has none."""

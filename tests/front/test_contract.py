@@ -321,6 +321,18 @@ def test_the_noise_of_a_displacement_is_no_motion_of_a_stiff_oil_spring(
     assert np.sum((measured - known)[settled] ** 2) < 3e-4 * np.sum(known[settled] ** 2)
 
 
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+def test_a_step_and_a_corner_of_a_displacement_are_no_noise(rate: float) -> None:
+    """k x to the moment, up to T0 and less than C; a triangle reaches T0 + C v on both flanks."""
+    damper = pzd.Damper({"T0_N": 300.0, "C_Ns_per_m": 1500.0, "k_N_per_m": 2e5})
+    time = np.arange(int(4.0 * rate)) / rate
+    step = damper.force(time, 1e-3 * (time > 2.0))
+    assert np.max(step) == pytest.approx(200.0, rel=1e-3)
+    turned = np.abs((time + 0.25) % 1.0 - 0.5) - 0.25
+    force = damper.force(time, -0.08 * turned)
+    assert np.max(np.abs(force[time > 1.0])) == pytest.approx(300.0 + 1500.0 * 0.08, rel=0.02)
+
+
 def test_a_voltage_may_be_a_number_or_move_and_must_be_given_where_it_matters(hidden: pzd.Damper) -> None:
     time = np.arange(1000) / 500.0
     x = 0.01 * np.sin(2.0 * np.pi * time)

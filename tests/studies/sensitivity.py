@@ -129,7 +129,9 @@ class Kept:
             return (*map(self._said, given.observations), rows, repr(rest))
         if isinstance(given, FitResult):
             return given.damper.model_dump_json(), given.effects, given.optimum.tobytes(), repr(given.misfit)
-        arrays = given.sample_indices, given.compared, given.measured, given.weights, given.nuisances.inner
+        before = given.nuisances.before
+        nuisances = given.nuisances.inner, np.zeros(0) if before is None else before.inner.data
+        arrays = given.sample_indices, given.compared, given.measured, given.weights, *nuisances
         return given.name, given.base_row, given.initial_force, *(array.tobytes() for array in arrays)
 
 

@@ -51,10 +51,8 @@ EFFECT = Effect(
     "System Dynamics 27",
     tests=(
         ({"deflection": 0.004, "side": 1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, 0.0025615528128088303),
-        (
-            {"deflection": 0.001, "side": 1.0, "k": 2e5, "d_c": 0.001, "F_c": 200.0},
-            0.0006180339887498949,
-        ),  # golden section
+        # The golden section.
+        ({"deflection": 0.001, "side": 1.0, "k": 2e5, "d_c": 0.001, "F_c": 200.0}, 0.0006180339887498949),
         ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": -0.002, "F_c": 200.0}, -0.0025615528128088303),
         ({"deflection": -0.004, "side": -1.0, "k": 2e5, "d_c": 0.002, "F_c": 200.0}, -0.004),
     ),

@@ -32,6 +32,7 @@ from pzd.diagnosis.changes.pairs import (
     averaged,
     course,
     cycles_compared,
+    has_average_cycle,
     model_compared,
     motion_away,
     nearest_motion,
@@ -56,6 +57,7 @@ from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
+from pzd.signals.measures import criterion
 from pzd.signals.nuisance import NuisanceConfig
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -344,19 +346,17 @@ def _farther(away: float, carried: Missed) -> float:
 
 def _not_averaged(state: State) -> list[PreparedRecord]:
     """Return the tests in which the control signal moves, or no cycle repeats."""
-    names = {test.record.name for test in averaged(state.prepared)}
-    return [p for p in state.prepared if p.record.name not in names]
+    return [test for test in state.prepared if not has_average_cycle(test)]
 
 
 def _missed_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
     """Return the share of the force (r.m.s.) that a damper misses in some tests, as they were run; None of none."""
-    missed = total = 0.0
-    for test in tests:
-        counted_samples = comparable_samples(test)
-        force = test.record.force[counted_samples]
-        missed += float(np.sum((force - predicted_force(damper, test)[counted_samples]) ** 2))
-        total += float(np.sum(force**2))
-    return float(np.sqrt(missed / total)) if total > 0.0 else None
+    if not tests:
+        return None
+    masks = [comparable_samples(test) for test in tests]
+    measured = np.concatenate([test.record.force[mask] for test, mask in zip(tests, masks, strict=True)])
+    made = np.concatenate([predicted_force(damper, test)[mask] for test, mask in zip(tests, masks, strict=True)])
+    return float(np.sqrt(criterion(measured - made, measured)))
 
 
 # --- What is found

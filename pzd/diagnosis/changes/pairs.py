@@ -112,7 +112,12 @@ class AveragedTest:
 
 def averaged(prepared: Sequence[PreparedRecord]) -> list[AveragedTest]:
     """Return the tests of constant control signal whose motion repeats."""
-    return [AveragedTest(p, pure_error(p.folded)) for p in prepared if p.cycles is not None and p.constant]
+    return [AveragedTest(p, pure_error(p.folded)) for p in prepared if has_average_cycle(p)]
+
+
+def has_average_cycle(test: PreparedRecord) -> bool:
+    """Whether the motion of a test repeats at a constant control signal."""
+    return test.cycles is not None and test.constant
 
 
 # --- Which test belongs to which

@@ -10,7 +10,7 @@ from pzd.artefacts import Finding
 from pzd.record import Array, Rows
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
-from pzd.signals.measures import resolution
+from pzd.signals.measures import noise_beside_motion, resolution
 
 # --- Steps of a converter ---
 
@@ -172,12 +172,7 @@ def _stands_away(values: Array, run: Rows, least: float) -> bool:
     line = np.polyfit(near - first, values[near], 1)
     rough = float(np.abs(values[near] - np.polyval(line, near - first)).max())
     off = float(np.abs(values[run] - np.polyval(line, run - first)).min())
-    return off > max(least, 3.0 * rough, OFF * _noise(values[rows]), OFF_SHARE * float(np.ptp(values)))
-
-
-def _noise(values: Array) -> float:
-    """Return the robust standard deviation of noise about a motion, from second differences of samples (n,)."""
-    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+    return off > max(least, 3.0 * rough, OFF * noise_beside_motion(values[rows]), OFF_SHARE * float(np.ptp(values)))
 
 
 # --- Cycles that change: a gain that steps, a zero that drifts ---
