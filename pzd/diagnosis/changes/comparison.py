@@ -350,13 +350,13 @@ def _not_averaged(state: State) -> list[PreparedRecord]:
 
 
 def _missed_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
-    """Return the share of the force (r.m.s.) that a damper misses in some tests, as they were run; None of none."""
+    """Return the share of the force (r.m.s.) that a damper misses in some tests, as they were run; None without a force."""
     if not tests:
         return None
     masks = [comparable_samples(test) for test in tests]
     measured = np.concatenate([test.record.force[mask] for test, mask in zip(tests, masks, strict=True)])
     made = np.concatenate([predicted_force(damper, test)[mask] for test, mask in zip(tests, masks, strict=True)])
-    return float(np.sqrt(criterion(measured - made, measured)))
+    return float(np.sqrt(criterion(measured - made, measured))) if measured.any() else None
 
 
 # --- What is found
