@@ -104,6 +104,8 @@ class Ranked(Frozen):
 
     effect: str
     gap_after: float
+    """W_s on the tests seen: of an adopted effect that of the damper handed on, of another one that at the step of the
+    search which decided on it."""
     delta_bic: float
     parameters: dict[str, float | tuple[float, ...]]
     reason: str

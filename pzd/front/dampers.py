@@ -32,8 +32,10 @@ _DRAWN = 401
 """Velocities of a drawn curve, evenly spaced: 0 is one of them."""
 _FASTEST = 1.0
 """Up to which speed a curve is drawn where nothing was tested [m/s]."""
-_BEYOND_NOISE = 8.0
-"""Standard deviations by which noise moves no sample of a displacement: not one in a billion, if it is normal."""
+_BEYOND_NOISE = 20.0
+"""Standard deviations of its noise by which cleaning may move a sample of a displacement.
+
+Reason: five were seen at most on measured motions, ten where a clock jitters; a step has hundreds."""
 
 
 class Damper(Result):

@@ -90,7 +90,7 @@ def test_the_bars_are_errors_in_percent_of_the_force_with_the_interval_of_the_ad
     )
     assert [label.get_text() for label in ax.get_yticklabels()] == [
         "held-out tests:", "simple model", "with orifice quadratic", "noise alone",
-        "seen tests, each alone:", "orifice quadratic", "shear thinning",
+        "seen tests:", "orifice quadratic", "shear thinning",
     ]  # fmt: skip
     held_out, candidate = (lines.get_segments()[0][:, 0] for lines in ax.collections)
     assert (held_out / 100.0) ** 2 == pytest.approx([gap.after + s * 1.96 * gap.standard_error for s in (-1.0, 1.0)])

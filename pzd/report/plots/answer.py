@@ -115,7 +115,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
     if context.diagnosed.diagnosis.gap is None:
         return
     held_out, candidates = _held_out_bars(context), _candidate_bars(context)
-    heads = ["held-out tests:", *(["seen tests, each alone:"] if candidates else [])]
+    heads = ["held-out tests:", *(["seen tests:"] if candidates else [])]
     rows: list[_Bar | str] = [heads[0], *held_out, *heads[1:], *candidates]
     names = [row if isinstance(row, str) else shortened(row.name) for row in rows]
     figure, ax = axes("error [% of the force]", height=_HEIGHT_IN, labels=names, key=0, right=0.25)
