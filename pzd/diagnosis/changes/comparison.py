@@ -350,7 +350,7 @@ def _not_averaged(state: State) -> list[PreparedRecord]:
 
 
 def _missed_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
-    """Return the share of the force (r.m.s.) that a damper misses in some tests, as they were run; None without a force."""
+    """Return the share of the force (r.m.s.) that a damper misses in tests as they were run; None without a force."""
     if not tests:
         return None
     masks = [comparable_samples(test) for test in tests]

@@ -178,9 +178,7 @@ def ranking(context: ReportContext) -> Iterator[Panel]:
     ax.grid(visible=False, axis="y")
     ax.grid(color=GRID, axis="x")
     alt = f"What each candidate leaves of the gap; best: {names[-1]}, W_s {ranked[-1].gap_after:.3g}."
-    caption = (
-        "Best first by what the noise makes likely. Adopted effects stand out in dark blue, together as handed on."
-    )
+    caption = "Best first by what the noise makes likely. Adopted effects are dark blue, together as handed on."
     yield Panel(figure, "What each candidate leaves of the gap", alt, caption)
 
 
