@@ -18,7 +18,7 @@ from pzd.damper.effects import library
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.cross_validation import CrossValidation
-from pzd.diagnosis.search.acceptance import nearly_others
+from pzd.diagnosis.search.determination import nearly_others
 from pzd.fit.cross_validation import FEWEST_DIFFERENCES, PredictionError, log_ratios, paired_t
 
 

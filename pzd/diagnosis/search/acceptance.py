@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pzd.damper.effect import Beside, Effect, Parameter
+from pzd.damper.effect import Effect, Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis import thresholds
@@ -20,7 +20,13 @@ from pzd.diagnosis.fit.problem import ZERO, Problem
 from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, late_instead_of_elastic, starts_of, towards_neutral
-from pzd.diagnosis.search.determination import ANOTHER_DAMPING, AT_LIMIT, at_limits, opens_below_friction
+from pzd.diagnosis.search.determination import (
+    ANOTHER_DAMPING,
+    AT_LIMIT,
+    at_limits,
+    nearly_others,
+    opens_below_friction,
+)
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 from pzd.signals.measures import rms
@@ -431,20 +437,6 @@ def says_the_same(other: Candidate, chosen: Candidate) -> bool:
     """Whether a law with more parameters gives the same force as the chosen one."""
     more = other.fitted.optimum.size > chosen.fitted.optimum.size
     return more and _share_apart(other, chosen) < thresholds.SAME_FORCE
-
-
-def nearly_others(damper: Damper, force: float) -> dict[str, str]:
-    """Return by effect of a damper which other one it nearly is by its values.
-
-    Parameters
-    ----------
-    damper : with the effects
-    force : largest force of the tests [N]
-    """
-    stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
-    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), stiffest, force)
-    others = {name: library()[name].nearly(values, beside) for name, values in damper.effects.items()}
-    return {name: other for name, other in others.items() if other is not None}
 
 
 def _is_limit_of(other: Candidate, chosen: Candidate) -> bool:

@@ -17,6 +17,7 @@ from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, pr
 from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
+from pzd.diagnosis.search.determination import nearly_others
 from pzd.record import Array
 
 # --- Starting values, and the drop in misfit that a linearised step promises from each
@@ -215,6 +216,11 @@ def candidates(
         found = list(pool.map(one, tried, gains))
         worth = thresholds.SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
         found = list(pool.map(lambda c: resumed(problem, before, c) if c.delta_bic < worth else c, found))
+        # What a law by more numbers came down to lies beyond a valley in which the search for it may have ended.
+        paying = (c for c in found if c.delta_bic < worth)
+        limits = {nearly_others(c.fitted.damper, problem.scales.force).get(c.effect) for c in paying}
+        short = [c.effect in limits and c.delta_bic >= worth for c in found]
+        found = list(pool.map(lambda c, ended: converged(problem, before, c) if ended else c, found, short))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
 

@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from pzd.damper.effect import Beside
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
@@ -78,6 +79,20 @@ def opens_below_friction(damper: Damper) -> bool:
     values = damper.effects["relief_valve"]
     nodes, opens = np.atleast_1d(values.get("at_voltage_V", 0.0)), np.atleast_1d(values["F_r"])
     return all(float(np.interp(row.voltage_V or 0.0, nodes, opens)) <= row.T0_N for row in damper.base)
+
+
+def nearly_others(damper: Damper, force: float) -> dict[str, str]:
+    """Return by effect of a damper which other one it nearly is by its values.
+
+    Parameters
+    ----------
+    damper : with the effects
+    force : largest force of the tests [N]
+    """
+    stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
+    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), stiffest, force)
+    others = {name: library()[name].nearly(values, beside) for name, values in damper.effects.items()}
+    return {name: other for name, other in others.items() if other is not None}
 
 
 def cancelling(problem: Problem, fitted: FitResult) -> Iterator[tuple[str, str]]:
