@@ -18,7 +18,7 @@ from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
-from pzd.diagnosis.fit.likelihood import WeightedRecord, weighted_record
+from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force, weighted_record
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
@@ -116,19 +116,18 @@ class Evidence:
         likely = probability_of_noise(self.campaign.checks(fitted.damper))
         return likely < config.significance and self.gap(fitted) >= config.negligible
 
-    def criterion(self, fitted: FitResult) -> float:
-        """Compute W_s over the compared samples of all that is seen."""
-        measured = np.concatenate([o.measured for o in self.whole.observations])
-        return criterion(measured - np.concatenate(fitted.simulated), measured)
+    def criterion(self, damper: Damper) -> tuple[float, float | None]:
+        """Compute W_s of a damper over the compared samples of all that is seen, whatever it was fitted to.
 
-    def criterion_error(self, fitted: FitResult) -> float | None:
-        """Compute the standard error of `criterion` from its scatter between tests; None with fewer than two."""
-        observations = self.whole.observations
-        residuals = [o.measured - force for o, force in zip(observations, fitted.simulated, strict=True)]
-        if len(residuals) < 2:
-            return None
+        Its standard error is that of the scatter between tests; None with fewer than two.
+        """
+        observed = self.whole.observations
+        residuals = self.campaign.parallel_map(lambda o: o.measured - o.at_compared(shown_force(o, damper)), observed)
+        left = criterion(np.concatenate(residuals), np.concatenate([o.measured for o in observed]))
+        if len(observed) < 2:
+            return left, None
         squares = np.array([residual @ residual for residual in residuals])
-        return criterion_error(squares, np.array([o.measured @ o.measured for o in observations]))
+        return left, criterion_error(squares, np.array([o.measured @ o.measured for o in observed]))
 
     def halves_weighed_by(self, weights: Evidence) -> tuple[Problem, Problem]:
         """Return the problems of either half, with these base rows and the weights of other evidence."""

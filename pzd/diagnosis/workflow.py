@@ -178,13 +178,13 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
             reason = "does not pay" if c.delta_bic > 0.0 else "explains less"
             reason = selection.reasons.get(c.effect, reason if c.searched else "promises too little to be searched for")
             # A later step, an exchange or the last descent moved what was adopted from where its own step left it.
-            adopted = c.effect in selection.adopted
-            fitted, seen = (selection.fitted, selection.final_evidence) if adopted else (c.fitted, evidence)
-            values: dict[str, Any] = dict(fitted.damper.effects[c.effect])
+            damper = (selection.fitted if c.effect in selection.adopted else c.fitted).damper
+            values: dict[str, Any] = dict(damper.effects[c.effect])
+            left, error = evidence.criterion(damper)
             rows[c.effect] = Ranked(
                 effect=c.effect,
-                gap_after=seen.criterion(fitted),
-                gap_standard_error=seen.criterion_error(fitted),
+                gap_after=left,
+                gap_standard_error=error,
                 delta_bic=round(c.delta_bic, 3),
                 at_voltage_V=values.pop("at_voltage_V", None),
                 parameters=values,

@@ -57,7 +57,7 @@ from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
-from pzd.signals.measures import criterion
+from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -399,11 +399,20 @@ class Findings:
             doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
             told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
             reported = [change for change in reported if change.name not in doubtful]
+        unreached = self._not_reached_before(best)
+        if unreached:
+            told = list(dict.fromkeys([*unreached, *told]))
+            reported = [change for change in reported if change.name not in unreached]
+            verdict = "ambiguous" if verdict in ("changed", "unchanged") else verdict
         listed = sorted([*reported, *zero], key=lambda change: -change.share)
         kinds = {"cycles" if c.before is not None else "model" for c in self.comparisons}
         compared = cast("Literal['cycles', 'model', 'both']", "both" if len(kinds) > 1 else kinds.pop())
         reason = self._reason(verdict, listed, others, difference)
-        if verdict == "unchanged" and (beside := self._left_out_differs()):
+        if unreached:
+            reason.append(
+                f"{', '.join(unreached)} acts where no test of {self.before.name} came, and may have been there before"
+            )
+        if verdict == "unchanged" and (beside := self._left_out_differs() or self._beyond_the_model(best)):
             verdict, reason = "unexplained", [*reason, beside]
         return Changes(
             verdict=verdict,
@@ -470,6 +479,66 @@ class Findings:
             f"{self.after.name} and {100.0 * own:.2g} % in {self.before.name} (r.m.s., of the force): what changed "
             "shows there alone, and has no name"
         )
+
+    def _stroke_beyond(self) -> str | None:
+        """Say which compared test goes farthest beyond the stroke of the first state; None where none does."""
+        strokes = [float(np.max(np.abs(r.displacement - self.first.middle_m))) for r in self.before.records]
+        farthest = {
+            r.name: float(np.max(np.abs(r.displacement - self.first.middle_m)))
+            for r in self.after.records
+            if r.name in {c.after for c in self.comparisons}
+        }
+        test = max(farthest, key=lambda name: farthest[name])
+        if farthest[test] <= (1.0 + CONSTANT_SHARE) * max(strokes):
+            return None
+        return (
+            f"{test} goes {_digits(1e3 * farthest[test])} mm from the middle, the tests of {self.before.name} "
+            f"{_digits(1e3 * max(strokes))} mm: what acts there alone may be no change"
+        )
+
+    def _beyond_the_model(self, best: Fitted) -> str | None:
+        """Say which test compared through the model differs by more than the first damper may miss; None if none does.
+
+        Beside tests compared cycle by cycle these decide nothing else, but an end stop may be reached in them alone.
+        """
+        if all(c.before is None for c in self.comparisons):
+            return None
+        likelihood = self.search.regression.likelihood
+        own = likelihood.own_of_tests(best.residuals, best.scatter)
+        beyond = {}
+        for i, (r, o, c) in enumerate(zip(best.residuals, own, self.comparisons, strict=True)):
+            left = float((r - o) @ (r - o) - np.sum(c.variance))
+            missed = LEVEL**2 * float(np.sum(likelihood.missed_by_model(i)))
+            if c.before is None and left > missed + (self.diagnose.visible * c.peak) ** 2:
+                beyond[c.after] = left**0.5 / c.peak
+        if not beyond:
+            return None
+        test = max(beyond, key=lambda name: beyond[name])
+        return (
+            f"but {test} differs from what the damper of {self.before.name} would give there by "
+            f"{100.0 * beyond[test]:.2g} % of its peak, more than that damper misses in its own tests: what shows "
+            "there alone has no name"
+        )
+
+    def _not_reached_before(self, best: Fitted) -> list[str]:
+        """Return the effects newly there that would not have shown in any test of the first state, had they been."""
+        return [
+            c.name
+            for c in best.candidates
+            if c.absent
+            and c.of == "damper"
+            and not any(
+                self._shows(self.first.changed(c.coordinates, best.values_of(c).tolist(), None), test)
+                for test in self.before.prepared
+            )
+        ]
+
+    def _shows(self, changed: Damper, test: PreparedRecord) -> bool:
+        """Whether a damper other than the first gives visibly another force in a test."""
+        mask = comparable_samples(test)
+        moved = (predicted_force(changed, test) - predicted_force(self.first.damper, test))[mask]
+        peak = float(np.max(np.abs(test.record.force)))
+        return bool(moved.size and rms(moved) >= self.diagnose.visible * peak)
 
     def _stands_out(self, best: Fitted, candidate: Candidate) -> bool:
         """Whether a change makes more than what is left without a name, which may be of the same cause."""
@@ -731,10 +800,16 @@ class Findings:
         temperatures = self._temperatures()
         if None not in temperatures and abs(temperatures[1] - temperatures[0]) > 0.5:  # type: ignore[operator]  # not None
             told.append(f"the damper was at {temperatures[1]:.3g} degC instead of {temperatures[0]:.3g}")
+        return [*told, *self._tests_told()]
+
+    def _tests_told(self) -> list[str]:
+        """Say how the tests were compared, and which are left out or go where no test of the first state came."""
         pairs = sum(c.before is not None for c in self.comparisons)
-        told.append(
+        told = [
             f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"
         )
+        if farther := self._stroke_beyond():
+            told.append(farther)
         told.extend(
             f"{counted(out, 'test')} of {state.name} left out: the control signal moves, or no cycle repeats"
             for state in (self.before, self.after)

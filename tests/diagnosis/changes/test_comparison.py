@@ -297,6 +297,20 @@ def test_how_small_a_change_would_be_hidden_by_what_the_damper_misses_is_told(rn
     assert "of peak would not be seen, since the damper of new misses as much" in hard.reason
 
 
+@pytest.mark.parametrize("equal", [True, False])
+def test_a_stop_that_no_test_reached_before_is_neither_new_nor_nothing(equal: bool, rng: np.random.Generator) -> None:
+    """Tests of 25 mm cannot know of a stop at 26 mm, whether the others of them are run again or not."""
+    damper = drawn_damper(rng, voltages=(0.0,)).with_effect("end_stop", {"k_e": 1.0e7, "x_e": 0.026})
+    before, other = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.025)), ((0.7, 0.018), (1.6, 0.022), (2.6, 0.015))
+    after = (*(before if equal else other), (1.0, 0.03))
+    changes = found(campaign(damper, rng, before), campaign(damper, rng, after))
+    assert changes.verdict in ("ambiguous", "unexplained"), changes.reason
+    assert names(changes) == []
+    assert "0V-1Hz-30mm goes 30 mm from the middle, the tests of new 25 mm" in changes.reason
+    reached = found(campaign(damper, rng), campaign(damper, rng, ((0.7, 0.025), (1.0, 0.03))))
+    assert (reached.verdict, "from the middle" in reached.reason) == ("unchanged", False), reached.reason
+
+
 def test_a_test_at_a_control_signal_that_the_first_state_has_not_seen_is_told(rng: np.random.Generator) -> None:
     damper = drawn_damper(rng, voltages=(0.0, 50.0, 100.0))
     before = [r for r in campaign(damper, rng) if r.median_voltage() != 50.0]
