@@ -805,9 +805,7 @@ class Findings:
     def _tests_told(self) -> list[str]:
         """Say how the tests were compared, and which are left out or go where no test of the first state came."""
         pairs = sum(c.before is not None for c in self.comparisons)
-        told = [
-            f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"
-        )
+        told = [f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"]
         if farther := self._stroke_beyond():
             told.append(farther)
         told.extend(
