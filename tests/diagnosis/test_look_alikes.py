@@ -13,9 +13,10 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import fit, refit, standard_errors
-from pzd.diagnosis.search.acceptance import nearly_others, rivals_of
+from pzd.diagnosis.search.acceptance import has_come_down_to, rivals_of
 from pzd.diagnosis.search.candidates import candidate, converged
-from pzd.diagnosis.search.forward_selection import reweighted
+from pzd.diagnosis.search.determination import nearly_others
+from pzd.diagnosis.search.forward_selection import reweighted, swap_step
 
 ONE_STROKE = ((0.5, 0.02), (2.0, 0.02))
 SEVERAL = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -76,6 +77,25 @@ def test_a_mount_that_gives_way_almost_at_once_may_be_a_play(
     )
     assert play.delta_bic - mount.delta_bic > DiagnoseConfig().rival_bic
     assert rivals_of(mount, (mount, play), DiagnoseConfig()) == rivals
+
+
+@pytest.mark.parametrize(("pressed", "kept"), [(0.3, "lash"), (8.0, "frame_compliance")])
+def test_a_mount_that_has_come_down_to_a_play_gives_its_place_to_it(
+    pressed: float, kept: str, rng: np.random.Generator
+) -> None:
+    """Though the play may fit a little worse: a smoothed displacement rounds its corner, as a mount's is."""
+    truth = damper_of(TWO, frame_compliance={"d_f": 1e-3, "F_f": pressed})
+    whole = evidence_of(campaign_of(sines(truth, rng, TWO, tests=SEVERAL, noise=1e-4)), damper_of(TWO)).whole
+    before = fit(whole, (), whole.start())
+    mount, play = (
+        converged(whole, before, candidate(whole, before, library()[effect])) for effect in ("frame_compliance", "lash")
+    )
+    assert has_come_down_to(mount, play) == (kept == "lash")
+    assert not has_come_down_to(play, mount)
+    only = DiagnoseConfig(forbid=all_but("lash", "frame_compliance"))
+    step, chosen = swap_step(whole, before, mount.effect, mount.fitted, lambda _: None, only, 1)
+    assert (chosen.effect, step.chosen) == (kept, kept)
+    assert kept == "frame_compliance" or step.rivals == ()
 
 
 def test_a_mount_that_has_given_way_before_the_oil_bears_may_be_a_play_lined_with_rubber(

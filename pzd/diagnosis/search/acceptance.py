@@ -427,7 +427,11 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
     that gives way at once is a play, a gas that does not harden is an offset.
     """
-    others = [c for c in tried if c.effect != chosen.effect and not says_the_same(c, chosen)]
+    others = [
+        c
+        for c in tried
+        if c.effect != chosen.effect and not says_the_same(c, chosen) and not has_come_down_to(c, chosen)
+    ]
     return tuple(
         c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
     )
@@ -437,6 +441,14 @@ def says_the_same(other: Candidate, chosen: Candidate) -> bool:
     """Whether a law with more parameters gives the same force as the chosen one."""
     more = other.fitted.optimum.size > chosen.fitted.optimum.size
     return more and _share_apart(other, chosen) < thresholds.SAME_FORCE
+
+
+def has_come_down_to(law: Candidate, other: Candidate) -> bool:
+    """Whether a law ends at a limit where it gives nearly the force of another one with fewer parameters.
+
+    Where a play meets its stops a smoothed displacement has no corner, and a mount of next to no force follows it best.
+    """
+    return _is_limit_of(other, law) and law.effect in at_limits(law.fitted)
 
 
 def _is_limit_of(other: Candidate, chosen: Candidate) -> bool:

@@ -87,7 +87,11 @@ def swap_step(
     own = as_candidate(problem, without, name, current)
     tried = [c for c in candidates(problem, without, config.forbid, jobs) if c.effect != name]
     ended = sorted((own, *nearly_as_good(problem, without, own, tried)), key=lambda c: c.delta_bic)
-    close = [c for c in ended if c is not own and c.delta_bic - own.delta_bic < config.rival_bic]
+    close = [
+        c
+        for c in ended
+        if c is not own and (c.delta_bic - own.delta_bic < config.rival_bic or acceptance.has_come_down_to(own, c))
+    ]
     spurious_effects = frozenset(c.effect for c in close if refused(c))
     alike = [c for c in close if c.effect not in spurious_effects]
     kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
@@ -100,6 +104,8 @@ def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
     if against_nature(other.fitted.damper):
         return False
     if other.delta_bic <= own.delta_bic and acceptance.says_the_same(own, other):
+        return True
+    if acceptance.has_come_down_to(own, other):
         return True
     return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
 
