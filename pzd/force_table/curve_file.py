@@ -20,18 +20,11 @@ from pzd.rig.config import matching
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import own_quantity
 from pzd.rig.files.sheet import Sheet, Wanted
-from pzd.rig.files.sniffing import Dialect, described, quantity_of, unit_of
+from pzd.rig.files.sniffing import COMPRESSION, DIRECTIONS, REBOUND, Dialect, described, quantity_of, unit_of
 from pzd.rig.files.units import UnitError, to_canonical
 from pzd.schema.errors import ConfigError, DataError, at
 from pzd.schema.yamltree import written
 
-REBOUND, COMPRESSION = "rebound", "compression"
-"""Columns of force by direction, as keys of `columns`."""
-_DIRECTIONS = {
-    REBOUND: re.compile(r"(?i)rebound|extension|\breb\b|zugstufe|d[ée]tente|estensione|rebote|\u4f38|\u590d\u539f"),
-    COMPRESSION: re.compile(r"(?i)compr|jounce|\bbump\b|\bcomp\b|druckstufe|\bbound\b|\u7e2e|\u538b\u7f29"),
-}
-"""Headers of the force in one direction."""
 LIKELY = 1.1
 """From this ratio of the forces at equal speeds on it is said which direction is likely rebound.
 
@@ -196,11 +189,11 @@ def _meant(file: _File, index: int) -> Quantity | None:
 def _directions(file: _File, named: dict[str, int], free: Sequence[int]) -> list[int]:
     """Return the columns of rebound and of compression; none where the file has not both."""
     found = []
-    for key, pattern in _DIRECTIONS.items():
+    for key, pattern in DIRECTIONS.items():
         like = [index for index in free if pattern.search(file.headers[index])]
         index = named.get(key, like[0] if len(like) == 1 else None)
         found += [index] if index is not None else []
-    return found if len(found) == len(_DIRECTIONS) and FORCE.name not in named else []
+    return found if len(found) == len(DIRECTIONS) and FORCE.name not in named else []
 
 
 def _forces(file: _File, named: dict[str, int], meant: dict[int, Quantity | None], free: Sequence[int]) -> list[int]:

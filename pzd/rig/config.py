@@ -167,9 +167,9 @@ class FilesEntry(Frozen):
     """Quantity -> value with unit (`100 V`) that no column holds."""
     sign: dict[str, Literal[1, -1]] = Field(default={})
     """Quantity -> 1 or -1; -1 turns a channel that counts compression positive."""
-    pattern: str | None = None
+    pattern: str | None = Field(default=None, min_length=1)
     """Regular expression searched in the file's name, its groups named after quantities or `setting`,
-    e.g. `(?P<voltage>[0-9.]+)V`; `x` in a number is a decimal point; units as under `units`."""
+    e.g. `(?P<voltage>[0-9.]+)V`; `x`, `p` or `_` between its digits is a decimal point; units as under `units`."""
     setting: str | None = None
     """Which setting of the damper these files measured."""
     fixture: Fixture | None = None

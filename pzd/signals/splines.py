@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.compiled import compiled
 from pzd.record import Array
 from pzd.signals.measures import found_once
 
@@ -79,13 +79,20 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
         first = np.floor(inside) if periodic else np.clip(np.floor(inside), 0, count - 2)
         of_each = c.reshape(len(c), -1)
         found = np.empty((np.size(first), of_each.shape[1]))
-        _between(of_each, first.astype(np.intp).ravel(), np.asarray(inside - first).ravel(), found)
+        _compiled_between()(of_each, first.astype(np.intp).ravel(), np.asarray(inside - first).ravel(), found)
         return found.reshape(*np.shape(inside), *values.shape[1:])
 
     return at
 
 
-@compiled
+@cache
+def _compiled_between() -> Callable[[Array, NDArray[np.intp], Array, Array], None]:
+    """Return `_between` compiled: numba is imported for the first value, and not to see that a run is fresh."""
+    from pzd.compiled import compiled
+
+    return compiled(_between)
+
+
 def _between(c: Array, first: NDArray[np.intp], share: Array, values: Array) -> None:
     """Fill values (m, p) of the cubics with coefficients c (n, p) at a share (m,) of the step behind a sample (m,)."""
     for i in range(first.size):

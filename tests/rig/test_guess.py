@@ -370,3 +370,38 @@ def test_csv_of_motec_i2_and_quoted_decimal_commas_are_read_as_they_are_guessed(
         (record,) = ingest(load(Path("own.yaml")).rig, Control(), tmp_path).records
         assert record.displacement == pytest.approx(X, abs=1e-9)
         assert record.force == pytest.approx(FORCE, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("heads", "taken"),
+    [
+        (("Weg soll [mm]", "Weg ist [mm]", "Kraft [N]"), ("Weg ist [mm]", "Kraft [N]")),
+        (("Position [mm]", "Side Load [N]", "Axial Load [N]"), ("Position [mm]", "Axial Load [N]")),
+        (("Axial Displacement Command [mm]", "Axial Displacement [mm]", "Force Ref [N]", "Axial Force [N]"),
+         ("Axial Displacement [mm]", "Axial Force [N]")),
+        (("Stroke [mm]", "Force [lbf]", "Force [N]"), ("Stroke [mm]", "Force [lbf]")),  # the same one twice
+    ],
+)  # fmt: skip
+def test_what_was_demanded_or_acts_across_the_stroke_is_not_taken_for_what_was_measured(
+    tmp_path: Path, heads: tuple[str, ...], taken: tuple[str, str]
+) -> None:
+    channels = {"[mm]": 1e3 * X, "[N]": FORCE, "[lbf]": FORCE / 4.448}
+    columns = {head: channels[head[head.index("["):]] for head in heads}  # fmt: skip
+    path = write(tmp_path / "a.csv", lines({"Time [s]": TIME} | columns))
+    text = "\n".join(guessed([path]))
+    assert f'displacement: "{taken[0]}"' in text
+    assert f'force: "{taken[1]}"' in text
+
+
+def test_of_several_columns_that_may_be_the_force_none_is_taken_unasked(tmp_path: Path) -> None:
+    columns = {"Test No": np.ones(TIME.size), "Time [s]": TIME, "Stroke [mm]": 1e3 * X}
+    path = write(tmp_path / "a.csv", lines(columns | {"Force A [N]": FORCE, "Force B [N]": 0.1 * FORCE}))
+    text = guessed([path])
+    assert "        force:   # fill in: one of Force A [N], Force B [N]" in text
+
+
+def test_a_curve_whose_columns_tell_rebound_is_proposed_without_a_sign(tmp_path: Path) -> None:
+    speed = np.linspace(0.05, 0.5, 10)
+    path = write(tmp_path / "a.csv", lines({"Velocity [m/s]": speed, "Comp Force [N]": speed, "Reb Force [N]": speed}))
+    with pytest.raises(DataError, match=r"by damper: \{curve: [^,]*a\.csv\} "):
+        guessed([path])

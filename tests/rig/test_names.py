@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,9 @@ NUMBERS: dict[str, tuple[str, float, dict[str, Any]]] = {
     "b_1,5V": ("voltage", 1.5, {"units": {"voltage": "V"}}),
     "b_1.5V": ("voltage", 1.5, {"units": {"voltage": "V"}}),
     "b_0x5V": ("voltage", 0.5, {"units": {"voltage": "V"}}),
+    "b_0p5V": ("voltage", 0.5, {"units": {"voltage": "V"}}),
+    "b 0.5 Volts": ("voltage", 0.5, {"units": {"voltage": "V"}}),
+    "b_2_150V": ("voltage", 150.0, {"units": {"voltage": "V"}}),
     "sine_T-20C": ("temperature", -20.0, {"units": {"temperature": "degC"}}),
     "sine_-20C": ("temperature", -20.0, {"units": {"temperature": "degC"}}),
     "temp-7C_b": ("temperature", -7.0, {"units": {"temperature": "degC"}}),
@@ -48,12 +52,41 @@ def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, n
     assert (entry.voltage_V if quantity == "voltage" else entry.temperature_degC) == value
 
 
+@pytest.mark.parametrize("mark", "_-")
+def test_a_number_in_a_name_that_may_be_two_is_asked_for_and_either_answer_is_read(tmp_path: Path, mark: str) -> None:
+    """Is r_0_5A half an ampere, or the first run at five? By either reading levels may be merged or exchanged."""
+    for level in ("0", "5"):
+        write(tmp_path / f"r_0{mark}{level}A.csv", lines(PLAIN))
+    text = guessed(sorted(tmp_path.glob("*.csv")))
+    (asked,) = (line for line in text if "pattern:" in line)
+    assert f"is 0{mark}5A in the names 0.5 A" in asked
+    assert "control: {name: current, unit: A}" in text
+    (tmp_path / "guess.yaml").write_text("\n".join(text), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"pattern: must have at least 1 character"):
+        load(tmp_path / "guess.yaml")
+    for answer, levels in zip(re.findall(r"'(\(\?P[^']+)'", asked), ({0.0, 0.5}, {0.0, 5.0}), strict=True):
+        said = "\n".join(text).replace("pattern: ''", f"pattern: '{answer}'")
+        (tmp_path / "said.yaml").write_text(said, encoding="utf-8")
+        config = load(tmp_path / "said.yaml")
+        assert {e.voltage_V for e in ingest(config.rig, config.control.signal(), tmp_path).entries} == levels
+
+
+def test_levels_in_the_names_of_folders_are_constants_of_their_files(tmp_path: Path) -> None:
+    for level in ("0mA", "500mA"):
+        for number in (1, 2):
+            write(tmp_path / level / f"r{number}.csv", lines(PLAIN))
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed(sorted(tmp_path.glob("*/*.csv")))), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    entries = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert [e.voltage_V for e in entries] == [0.0, 0.0, 0.5, 0.5]
+
+
 @pytest.mark.parametrize(
     ("name", "pattern", "remedy"),
     [
-        ("b_1,5V", r"(?P<voltage>[0-9]+)V", r"(?P<voltage>-?[0-9.,x]+)V"),
-        ("b_1.5V", r"_(?P<voltage>[0-9]+)", r"_(?P<voltage>-?[0-9.,x]+)"),
-        ("b_15V", r"(?P<voltage>[0-9])V", r"(?P<voltage>-?[0-9.,x]+)V"),
+        ("b_1,5V", r"(?P<voltage>[0-9]+)V", r"(?P<voltage>-?[0-9.,xp]+)V"),
+        ("b_1.5V", r"_(?P<voltage>[0-9]+)", r"_(?P<voltage>-?[0-9.,xp]+)"),
+        ("b_15V", r"(?P<voltage>[0-9])V", r"(?P<voltage>-?[0-9.,xp]+)V"),
     ],
 )
 def test_a_number_that_a_pattern_cuts_is_refused(tmp_path: Path, name: str, pattern: str, remedy: str) -> None:
@@ -61,7 +94,7 @@ def test_a_number_that_a_pattern_cuts_is_refused(tmp_path: Path, name: str, patt
     more = {"units": {"voltage": "V"}}
     (said,) = wrong(tmp_path, {"path": "*.csv", "pattern": pattern, **more})
     assert "rig.files.0.pattern: voltage: only" in said
-    assert "(?P<voltage>-?[0-9.,x]+)" in said
+    assert "(?P<voltage>-?[0-9.,xp]+)" in said
     assert read_by(tmp_path, remedy, more) == float(name[2:-1].replace(",", "."))
 
 

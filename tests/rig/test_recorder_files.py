@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 
+from pzd.config import load
 from pzd.quantities import Control
 from pzd.record import Array
 from pzd.rig.config import RigConfig
@@ -376,3 +377,83 @@ def test_a_file_that_no_format_reads_is_told_by_its_kind(start: bytes, kind: str
     path.write_bytes(start)
     with pytest.raises(DataError, match=f"this is {kind}; export the table as xlsx, CSV or other delimited text"):
         guessed([path])
+
+
+@pytest.mark.parametrize(
+    ("minus", "mark", "decimal"),
+    [("\u2212", "", "."), ("-", "'", ","), ("-", "\u2019", "."), ("\u2212", "\u202f", ",")],
+)
+def test_a_typographic_minus_and_marks_between_thousands_are_no_part_of_a_number(
+    tmp_path: Path, minus: str, mark: str, decimal: str
+) -> None:
+    def cell(value: float) -> str:
+        return f"{value:,.6f}".replace(",", "~").replace(".", decimal).replace("~", mark).replace("-", minus)
+
+    rows = [";".join(map(cell, row)) for row in zip(TIME, 1e6 * X, FORCE, strict=True)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Time [s];Stroke [µm];Force [N]", *rows]) + "\n", encoding="utf-8")
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
+    assert record.displacement == pytest.approx(X, abs=1e-11)
+    assert record.force == pytest.approx(FORCE, abs=1e-5)
+
+
+@pytest.mark.parametrize("ending", ["csv", "xlsx"])
+def test_extremes_and_a_remark_below_the_table_are_left_out_and_told(tmp_path: Path, ending: str) -> None:
+    head, below = ("Time [s]", "Stroke [mm]", "Force [N]"), (("Max", 15, 300.5), ("Min", -15, -300.5), ("Warm oil",))
+    path = tmp_path / f"a.{ending}"
+    if ending == "csv":
+        text = [",".join(head), *table(TIME, MM, FORCE), "", *(",".join(map(str, row)) for row in below)]
+        path.write_text("\n".join(text) + ",,\n", encoding="utf-8")
+    else:
+        openpyxl = pytest.importorskip("openpyxl")
+        book = openpyxl.Workbook()
+        for row in (head, *zip(TIME.tolist(), MM.tolist(), FORCE.tolist(), strict=True), (None,), *below):
+            book.active.append(row)
+        book.save(path)
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    rig = ingest(config.rig, config.control.signal(), tmp_path)
+    assert rig.records[0].time.size == SAMPLES
+    assert any("4 lines of words below the table" in row.was for row in rig.ingested), rig.ingested
+
+
+def test_units_in_capitals_are_read_as_they_are_meant(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "\n".join(["TIME (S),DISP (MM),FORCE (KN)", *table(TIME, MM, FORCE / 1e3)]) + "\n", encoding="utf-8"
+    )
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
+    assert record.displacement == pytest.approx(X, abs=1e-9)
+    assert record.force == pytest.approx(FORCE, abs=1e-3)
+
+
+def test_zeros_that_fill_the_block_of_a_card_are_no_part_of_a_text(tmp_path: Path) -> None:
+    text = "\n".join(["time_s,displacement_m,force_N", *table(TIME, X, FORCE)]) + "\n"
+    (tmp_path / "a.csv").write_bytes(text.encode() + bytes(300))
+    config = RigConfig.model_validate_json('{"files": [{"path": "*.csv"}]}')
+    assert ingest(config, Control(), tmp_path).records[0].time.size == SAMPLES
+
+
+def test_whole_seconds_as_stamps_tell_the_rate_of_the_samples_between_them(tmp_path: Path) -> None:
+    """The first second may have begun before the recording, and the last ended behind it."""
+    stamps = [f"2026-11-27 09:30:{int(0.37 + t):02d}" for t in TIME]
+    (tmp_path / "a.csv").write_text("\n".join(["t,x,F", *table(stamps, MM, FORCE)]) + "\n", encoding="utf-8")
+    entry = {"path": "*.csv", "columns": {"time": "t", "displacement": "x", "force": "F"},
+             "units": {"time": "%Y-%m-%d %H:%M:%S", "displacement": "mm", "force": "N"}}  # fmt: skip
+    config = RigConfig.model_validate_json(json.dumps({"files": [entry]}))
+    with pytest.raises(DataError, match="say rate_Hz: 500 or what is known of it"):
+        ingest(config, Control(), tmp_path)
+
+
+def test_an_index_of_instants_without_a_name_is_the_clock_of_a_parquet(tmp_path: Path) -> None:
+    pd = pytest.importorskip("pandas")
+    index = pd.Timestamp("2026-11-27T09:30:00.1+01:00") + pd.to_timedelta(TIME, unit="s")
+    pd.DataFrame({"disp_mm": MM, "force [N]": FORCE}, index=index).to_parquet(tmp_path / "a.parquet")
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([tmp_path / "a.parquet"])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
+    assert record.time == pytest.approx(TIME, abs=1e-9)

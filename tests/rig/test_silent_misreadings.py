@@ -173,9 +173,7 @@ def test_a_header_below_a_blank_line_and_a_title_among_the_data_is_named_as_such
     assert "a.csv:504: the header stands here again and once more below" in said
 
 
-@pytest.mark.parametrize(
-    ("cell", "decimal"), [("1.129,9", ","), ("1,129.9", "."), ("1'129.9", "."), ("-12 129,9", ",")]
-)
+@pytest.mark.parametrize(("cell", "decimal"), [("1.129,9", ","), ("1,129.9", "."), ("-12 129,9", ",")])
 def test_grouped_thousands_are_reported_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
     text = [line.replace(".", decimal) for line in lines(CANONICAL, separator=";")]
     text[7] = ";".join([*text[7].split(";")[:2], cell, *text[7].split(";")[3:]])

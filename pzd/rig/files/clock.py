@@ -59,7 +59,9 @@ def standstills(test: RawRecord) -> list[str]:
     steps = np.diff(time)
     if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
         return [told]
-    rate = (time.size - 1) / (time[-1] - time[0])
+    goes_on = np.flatnonzero(steps > 0.0) + 1  # the first stamp and the last may not be whole ones
+    first, last = (goes_on[0], goes_on[-1]) if goes_on.size > 1 else (0, time.size - 1)
+    rate = (last - first) / (time[last] - time[first])
     when = "or what is known of it, and leave out the column of the time"
     return [Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 from pzd.schema.errors import DataError, FilesError, at
@@ -41,6 +42,7 @@ def text_of(path: Path, encoding: str) -> str:
         raise DataError(f"{at(path, place)}: not {encoding} text; say its encoding, e.g. encoding: {likely}") from None
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.rstrip("\0")  # a logger that claims a block of its card in advance leaves the rest of it at zero
     if "\0" in text:
         wide = without_mark(raw)
         hint = f"; it is text in {wide}: say encoding: {wide}" if wide else ""
@@ -78,6 +80,23 @@ def text_bytes(path: Path) -> bytes:
         if raw.startswith(magic):
             raise DataError(f"{at(path)}: this is {kind}; export the table as xlsx, CSV or other delimited text")
     return raw
+
+
+_BETWEEN_THOUSANDS = re.compile(r"(?<=\d)['\u2019\u00a0\u202f](?=\d{3})")
+"""Marks that stand between digits for nothing but thousands; a comma or a point may be that of a decimal."""
+
+
+def plain_numbers(text: str) -> str:
+    """Return text without marks between thousands that mean nothing else, and with every minus as a hyphen.
+
+    Examples
+    --------
+    >>> plain_numbers("\u22121'234,5")
+    '-1234,5'
+    """
+    if "\u2212" in text:
+        text = text.replace("\u2212", "-")
+    return _BETWEEN_THOUSANDS.sub("", text) if any(mark in text for mark in "'\u2019\u00a0\u202f") else text
 
 
 def after_lines(text: str, count: int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -29,10 +29,13 @@ from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (
     CONTROLS,
+    DIRECTIONS,
     Dialect,
     assigned,
+    claims,
     control_of,
     described,
+    doubt_in_names,
     is_canonical,
     one_pattern,
     quantity_of,
@@ -100,7 +103,7 @@ def _try_reading(path: Path, name: str, layout: NamedLayout) -> None:
 # --- Entries of `rig.files`, by the layout that fits or guessed from headers and names ---
 
 _DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y")
-_TIMES = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
 FORMATS = (
     *(f"{date}{between}{time}" for date in _DATES for between in "T " for time in (*_TIMES, "%H:%M:%S.%f%z")),
     *_TIMES,
@@ -176,16 +179,36 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
+        levels = _levels_of_folders([file.path for file in group], control)
         for path, members in _patterns([file.path for file in group]):
             mine = [file for file in group if file.path in members]
             d = mine[0].dialect
-            columns = dict(mine[0].columns) if d.headless else assigned(d.header, d.units, control)
+            columns = dict(mine[0].columns) if d.headless else _told(d, control)
             pattern, units = _from_names(mine, columns, control)
             lines = [f"    - path: {written(path)}"]
             lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units)]
             controlled = VOLTAGE in columns or control.name in units
+            if not controlled and (level := levels.get(mine[0].path.parent)):
+                lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
+                controlled = True
             yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file.path) for file in mine))
+
+
+def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, str]:
+    """Return by folder the control signal in its name; nothing with one folder, or where a name has none."""
+    folders = sorted({path.parent for path in paths})
+    found = value_in_names([folder.name for folder in folders], control.name) if len(folders) > 1 else None
+    if found is None:
+        return {}
+    values = ((folder, re.search(found[0], folder.name)) for folder in folders)
+    return {folder: f"{match[1].replace('x', '.').replace('p', '.')} {found[1]}" for folder, match in values if match}
+
+
+def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:
+    """Return the header of every quantity but a displacement or force of which several columns may be the one."""
+    found = claims(dialect.header, dialect.units, control)
+    return {q: heads[0] for q, heads in found.items() if len(heads) == 1 or q not in (DISPLACEMENT, FORCE)}
 
 
 def _from_names(
@@ -210,6 +233,7 @@ def _keys(
 ) -> Iterator[str]:
     """Write the keys of an entry; `in_names` holds the units of the quantities in the pattern."""
     dialect = files[0].dialect
+    several = {} if dialect.headless else claims(dialect.header, dialect.units, control)
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
     missing = [q for q in NEEDED if q not in columns]
@@ -220,24 +244,33 @@ def _keys(
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        yield from _asked_columns(files[0], columns, missing)
+        yield from _asked_columns(files[0], columns, missing, several)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
-    units += list(_asked_units(files[0], columns, missing))
+    if not pattern and VOLTAGE not in columns and (doubt := doubt_in_names([file.path.stem for file in files])):
+        units.append(f"  {doubt[0]}: {doubt[1]}")
+    units += list(_asked_units(files[0], columns, [q for q in missing if q not in several]))
     if units:
         yield "units:"
         yield from units
     if pattern:
         yield _pattern_key(pattern)
+    elif VOLTAGE not in columns and (doubt := doubt_in_names([file.path.stem for file in files])):
+        yield _asked_pattern(*doubt)
     yield from _events(files[0])
     if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
-def _asked_columns(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:
+def _asked_columns(
+    file: SniffedFile,
+    columns: dict[Quantity, str],
+    missing: Sequence[Quantity],
+    several: Mapping[Quantity, Sequence[str]],
+) -> Iterator[str]:
     """Write the empty places of columns that only a person knows, each with those that may stand there."""
     offered: list[list[str]] = []
     for quantity in missing:
-        free = _candidates(file, columns, quantity)
+        free = [*several.get(quantity, _candidates(file, columns, quantity))]
         counted = "; or say rate_Hz: N instead, where no column holds it" if quantity is TIME else ""
         if free in offered:
             yield f"  {quantity.name}:   # fill in: one of the others of these{counted}"
@@ -286,17 +319,28 @@ def _rate(file: SniffedFile) -> float | None:
 
 
 def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
-    """Return one path pattern for all files where one matches exactly these, else every file by itself."""
-    folders, endings = {path.parent for path in paths}, {path.suffix for path in paths}
-    if len(paths) > 1 and len(folders) == len(endings) == 1:
-        folder, pattern = paths[0].parent, f"*{paths[0].suffix}"
-        if set(folder.glob(pattern)) == set(paths):
-            return [((folder / pattern).as_posix(), paths)]
-    return [(path.as_posix(), [path]) for path in paths]
+    """Return a path pattern for the files of each folder where one matches exactly these, else every file by itself."""
+    found: list[tuple[str, Sequence[Path]]] = []
+    for folder in dict.fromkeys(path.parent for path in paths):
+        mine = [path for path in paths if path.parent == folder]
+        pattern = f"*{mine[0].suffix}"
+        if len(mine) > 1 and set(folder.glob(pattern)) == set(mine):
+            found.append(((folder / pattern).as_posix(), mine))
+        else:
+            found += [(path.as_posix(), [path]) for path in mine]
+    return found
 
 
 def _pattern_key(pattern: str | None) -> str:
     return f"pattern: '{pattern}'    # from the files' names"
+
+
+def _asked_pattern(name: str, unit: str, number: str) -> str:
+    """Write the empty place of a pattern where a number in the names may be two: 0_5A."""
+    mark = "_" if "_" in number else "-"
+    one, other = (f"'(?P<{name}>{digits}){unit}(?![A-Za-z])'" for digits in (f"[0-9]+{mark}[0-9]+", "[0-9]+"))
+    whole, last = number.replace(mark, ".").rstrip(unit), number.partition(mark)[2].rstrip(unit)
+    return f"pattern: ''   # fill in: is {number} in the names {whole} {unit}, {one}, or {last} {unit}, {other}?"
 
 
 def _dialect_keys(dialect: Dialect) -> Iterator[str]:
@@ -509,9 +553,17 @@ def _control(files: Sequence[SniffedFile]) -> Control:
     signals = [control_of(file.dialect.header, file.dialect.units) for file in files]
     control = next((signal for signal in signals if signal != Control()), Control())
     controlled = any(VOLTAGE in dict(file.columns) for file in files)
-    if control == Control() and not controlled and value_in_names([file.path.stem for file in files], "current"):
+    if control == Control() and not controlled and _current_in_names([file.path for file in files]):
         return Control("current", "A")
     return control
+
+
+def _current_in_names(paths: Sequence[Path]) -> bool:
+    """Whether a current stands in the name of every file, or of its folder."""
+    stems, amperes = [path.stem for path in paths], Control("current", "A")
+    doubt = doubt_in_names(stems)
+    named = value_in_names(stems, amperes.name) is not None or (doubt is not None and doubt[0] == amperes.name)
+    return named or bool(_levels_of_folders(paths, amperes))
 
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
@@ -556,10 +608,11 @@ def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str
     if TIME not in columns and _FREQUENCY.search(heads[0]) and columns.get(FORCE, heads[0]) == heads[0]:
         return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
     if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
-        return (
-            "a curve of force over velocity, and no recording over time: in place of a rig take it by damper: "
-            f"{{curve: {file.path.as_posix()}, sign: 1}}, or sign: -1 where positive velocities compress"
-        )
+        curve = "a curve of force over velocity, and no recording over time: in place of a rig take it by damper: "
+        path = file.path.as_posix()
+        if all(any(pattern.search(head) for head in heads) for pattern in DIRECTIONS.values()):
+            return f"{curve}{{curve: {path}}}"
+        return f"{curve}{{curve: {path}, sign: 1}}, or sign: -1 where positive velocities compress"
     accelerations = [
         head for head in heads if unit_of(_accelerated(head), file.unit_below(head), ACCELERATION) is not None
     ]

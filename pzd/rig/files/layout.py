@@ -130,7 +130,7 @@ class Layout:
         for group, (first, last) in spans.items():
             whole = _whole_number(name, first, last)
             if whole != name[first:last]:
-                take = f"let the group take all of it, e.g. (?P<{group}>-?[0-9.,x]+)"
+                take = f"let the group take all of it, e.g. (?P<{group}>-?[0-9.,xp]+)"
                 faults.append(
                     f"{self.place}.pattern: {group}: only {name[first:last]} of the number {whole} is taken; {take} "
                     f"(got {path.name})"
@@ -153,7 +153,7 @@ class Layout:
                     f"{self.place}.units: {own.name}: the file's name has no unit; say {own.name}: {own.unit}"
                 )
                 continue
-            number = text.replace("x", ".").replace(",", ".")
+            number = re.sub(r"(?<=\d)[xp,_-](?=\d)", ".", text)
             at_place = f"{self.place}.pattern: {path.name}"
             values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
         return values
@@ -163,8 +163,8 @@ def _whole_number(name: str, first: int, last: int) -> str:
     """Return the number in a name of which a stretch is part, digits behind a decimal sign included."""
     if first < 0 or not name[first:last].strip("-"):
         return name[max(first, 0) : max(last, 0)]
-    before = re.search(r"(?:\d+[.,x]|\d+)?$", name[:first]) if name[first].isdigit() else None
-    after = re.match(r"\d*(?:[.,x]\d+)?", name[last:]) if name[last - 1].isdigit() else None
+    before = re.search(r"(?:\d+[.,xp]|\d+)?$", name[:first]) if name[first].isdigit() else None
+    after = re.match(r"\d*(?:[.,xp]\d+)?", name[last:]) if name[last - 1].isdigit() else None
     return (before[0] if before else "") + name[first:last] + (after[0] if after else "")
 
 

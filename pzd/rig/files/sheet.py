@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.schema.errors import DataError, at
+from pzd.rig.files.dialect import plain_numbers
+from pzd.schema.errors import DataError, at, counted
 
 LIKE_A_CLOCK = re.compile(r"^t(?![a-z0-9])|time|clock|zeit|\btemps\b|tiempo|^second|^sek", re.IGNORECASE)
 """Headers of a column of time, whatever is in it."""
@@ -286,6 +287,37 @@ def spelled(value: Any) -> str:
     return f"{value:.15g}" if isinstance(value, float) else str(value).strip()
 
 
+NO_SAMPLE = "take a row without a value out: it is told as a lost sample"
+"""What to do about a cell that holds no value of its channel."""
+MOST_BELOW = 10
+"""Lines of words below a table; more are none."""
+
+
+def words_below(first: Sequence[str]) -> int:
+    """Return how many rows at the end of a table say something in words: its extremes, a remark, `End of test`.
+
+    Parameters
+    ----------
+    first : first cell of the last rows, as many as there are up to one more than `MOST_BELOW`
+
+    Examples
+    --------
+    >>> words_below(["1.998", "", "Max", "Remark: warm"]), words_below(["A", "B"]), words_below(["1.998", ""])
+    (3, 0, 0)
+    """
+    count, words = 0, False
+    for cell in reversed(first):
+        if cell and not cell[0].isalpha():
+            return count if words else 0
+        count, words = count + 1, words or bool(cell)
+    return 0
+
+
+def told_below(count: int) -> ReadingStep:
+    """Report the lines of words below a table that are left out."""
+    return ReadingStep("left out", None, f"{counted(count, 'line')} of words below the table", "")
+
+
 def number(text: str) -> float:
     """Read the number in a text; infinities, NaN and digits grouped by `_` are none.
 
@@ -421,7 +453,7 @@ def _numbers(sheet: Sheet, head: str, pieces: Sequence[Cells]) -> tuple[Array, l
             continue
         for row, cell in enumerate(piece, start=start):
             try:
-                values[row] = number(cell) if cell else np.nan
+                values[row] = number(plain_numbers(cell)) if cell else np.nan
             except ValueError:
                 bad.append((row, cell))
     places = [(sheet.place(row), f"a number is needed (got {cell!r})") for row, cell in bad]

@@ -31,7 +31,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes, without_mark
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, plain_numbers, text_bytes, without_mark
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
 from pzd.rig.files.one_clock import headers_together
@@ -60,6 +60,13 @@ CONTROLS = {
     Control("current", "A"): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41",
 }
 """Headers of the control signal."""
+REBOUND, COMPRESSION = "rebound", "compression"
+"""Columns of force by direction, as the keys of a curve's `columns`."""
+DIRECTIONS = {
+    REBOUND: re.compile(r"(?i)rebound|extension|\breb\b|zugstufe|d[ée]tente|estensione|rebote|\u4f38|\u590d\u539f"),
+    COMPRESSION: re.compile(r"(?i)compr|jounce|\bbump\b|\bcomp\b|druckstufe|\bbound\b|\u7e2e|\u538b\u7f29"),
+}
+"""Headers of the force in one direction."""
 _WITH_UNIT = {
     TIME: "^t$",
     DISPLACEMENT: "^[xs]$",
@@ -94,11 +101,29 @@ def control_of(headers: Sequence[str], units: Sequence[str] | None) -> Control:
 
 
 def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> dict[Quantity, str]:
-    """Assign headers to quantities, each header to one quantity alone.
+    """Assign headers to quantities, each header to one quantity alone; of several that say as much, the first.
 
-    A column in a unit of the quantity is taken before one in volts or without a unit.
+    A column in a unit of the quantity is taken before one in volts or without a unit, and what was measured along the
+    stroke before what was demanded or acts across it.
     """
-    found: dict[Quantity, tuple[int, str]] = {}
+    return {quantity: heads[0] for quantity, heads in claims(headers, units, control).items()}
+
+
+_NOT_THE_ONE = re.compile(
+    r"command|\bcmd|_cmd|soll|set[ _-]?p(oin)?t\b|demand|target|desired|setting|\bref\b|_ref\b|referen|consigne"
+    r"|consigna|zadan|\bside|lateral|transvers|radial|horizontal|\bquer|seitlich|seiten|friction|reibung|\berror\b"
+    r"|abweichung"
+    r"|\u6307\u4ee4|\u8bbe\u5b9a|\u76ee\u6a19|\u76ee\u6807"
+)
+"""Words of a header that was demanded and not measured, or that acts across the stroke."""
+
+
+def claims(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> dict[Quantity, list[str]]:
+    """Return by quantity the headers that name it best, in their order; several where nothing tells which is meant.
+
+    A word says more than a symbol, which may be that of a frequency or a sample.
+    """
+    found: dict[Quantity, tuple[tuple[bool, int, bool], list[str]]] = {}
     for index, header in enumerate(headers):
         below = units[index] if units else None
         quantity = quantity_of(header, below, control)
@@ -107,8 +132,11 @@ def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Contr
         canonical = is_canonical(header, quantity, control)
         unit = unit_of(header, below, own_quantity(quantity, control))
         rank = 3 if canonical else 2 if unit is not None else 0 if _in_brackets(header, units, index) else 1
-        if quantity not in found or rank > found[quantity][0]:
-            found[quantity] = (rank, header)
+        best = canonical or not _NOT_THE_ONE.search(_bare(header)), rank, len(_bare(header)) > 1
+        if quantity not in found or best > found[quantity][0]:
+            found[quantity] = (best, [header])
+        elif best == found[quantity][0] and _bare(header) not in map(_bare, found[quantity][1]):
+            found[quantity][1].append(header)
     return {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
 
 
@@ -174,13 +202,13 @@ def _bare(header: str) -> str:
 
 # --- Values in the name of a file: control signal, temperature, position of the clickers ---
 
-_NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)"
+_NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.xp,][0-9]+)?)"
 _VALUES = {
-    "voltage": re.compile(rf"{_NUMBER}(mV|kV|V)(?![A-Za-z])"),
-    "current": re.compile(rf"{_NUMBER}(mA|A)(?![A-Za-z])"),
+    "voltage": re.compile(rf"{_NUMBER} ?(mV|kV|V|Volts?)(?![A-Za-z])"),
+    "current": re.compile(rf"{_NUMBER} ?(mA|A|Amps?)(?![A-Za-z])"),
     "temperature": re.compile(rf"{_NUMBER}(degC|C)(?![A-Za-z])"),
 }
-"""150V, 0x5A, 22degC."""
+"""150V, 0x5A, 0p5A, 0.5 Amp, 22degC."""
 _CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
 """C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
 
@@ -199,11 +227,40 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
         return None
     (unit,) = units
     found = [(stem, match) for stem, match in zip(stems, matches, strict=True) if match]
+    if name != "temperature" and any(_two_numbers(stem, match) for stem, match in found):
+        return None
     minus = {minus_before(stem, match.start(1)) for stem, match in found if stem[: match.start(1)].endswith("-")}
     if len(minus) > 1:
         return None  # a dash in one name and a minus in another
     comma = "," if any("," in match[1] for _, match in found) else ""
-    return f"(?P<{name}>{'-?' * (True in minus)}[0-9.{comma}x]+){unit}(?![A-Za-z])", {"C": "degC"}.get(unit, unit)
+    blank = " ?" * any(match.end(1) < match.start(2) for _, match in found)
+    number = f"(?P<{name}>{'-?' * (True in minus)}[0-9.{comma}xp]+)"
+    return f"{number}{blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+
+
+_DECIMALS_OF_IT = re.compile(r"(?<!\d)\d{1,2}[_-]$")
+
+
+def doubt_in_names(stems: Sequence[str]) -> tuple[str, str, str] | None:
+    """Return a control signal that stands in every name, its unit, and a number of it that may be two; None without.
+
+    Examples
+    --------
+    >>> doubt_in_names(["mr_0_5A", "mr_1_5A"])
+    ('current', 'A', '0_5A')
+    """
+    for name, unit in (("voltage", "V"), ("current", "A")):
+        found = [(stem, match) for stem in stems if (match := _VALUES[name].search(stem))]
+        doubtful = [told for stem, match in found if (told := _two_numbers(stem, match))]
+        if doubtful and len(found) == len(stems):
+            return name, unit, max(doubtful, key=lambda number: number.rstrip("VAmk")[-1])  # 0_5 asks better than 0_0
+    return None
+
+
+def _two_numbers(stem: str, match: re.Match[str]) -> str | None:
+    """Return a number in a name with one before it, of which it may be the decimals: 0_5A, 1-5A; None without."""
+    before = _DECIMALS_OF_IT.search(stem[: match.start(1)])
+    return stem[before.start() : match.end()] if before and match[1].isdigit() and len(match[1]) < 3 else None
 
 
 def setting_in_names(stems: Sequence[str]) -> str | None:
@@ -540,5 +597,6 @@ def _unquoted(cell: str) -> str:
 
 def _numbers(row: list[str], decimal: str) -> int:
     """Count the cells of a row that are numbers, or a date or time."""
-    spelled = [cell.replace(",", ".") if decimal == "," and "." not in cell else cell for cell in row]
+    plain = [plain_numbers(cell) for cell in row]
+    spelled = [cell.replace(",", ".") if decimal == "," and "." not in cell else cell for cell in plain]
     return sum(bool(_CELL_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)

@@ -39,6 +39,10 @@ SPELLINGS = {
     **dict.fromkeys(("Millimeters", "Millimeter", "Millimetres"), "mm"),
     **dict.fromkeys(("Seconds", "Second", "secs"), "s"),
     "lbs": "lbf",
+    # Of headers in capitals throughout, as old test stands write them.
+    **{"KN": "kN", "MM": "mm", "CM": "cm", "S": "s", "SEC": "s", "SECONDS": "s", "MSEC": "ms", "LBS": "lbf"},
+    **{"LBF": "lbf", "KGF": "kgf", "IN": "inch", "INCH": "inch", "INCHES": "inch", "VOLTS": "V", "AMPS": "A"},
+    **dict.fromkeys(("mil", "mils"), "thou"),
     "kips": "kip",
     "deg_C": "degC",
     **dict.fromkeys(('"', "''", "\u2033", "\u201d"), "inch"),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pzd.rig.files.sheet import FileTable, cells_of, spelled
+from pzd.rig.files.sheet import MOST_BELOW, FileTable, cells_of, spelled, told_below, words_below
 
 if TYPE_CHECKING:
     from pzd.rig.config import FilesEntry
@@ -53,6 +53,9 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | 
     width = max((n + 1 for n, head in enumerate(named) if head is not None), default=0)
     if not width or not body:
         return None
+    begin = ["" if row[0] is None else spelled(row[0]) for row in body[-MOST_BELOW - 1 :]]
+    below = words_below(begin)
+    body = body[: len(body) - below]
     units = tuple(spelled(v) if v is not None else "" for v in heads[-1][:width]) if entry.units_row else None
     return FileTable(
         name,
@@ -61,6 +64,7 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | 
         units,
         np.arange(len(body)) + entry.skip + above + 1,
         entry.skip + 1 if entry.header is None else None,
+        steps=(told_below(below),) if below else (),
     )
 
 

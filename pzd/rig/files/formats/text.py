@@ -21,8 +21,18 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, after_lines, fields_of, text_of
-from pzd.rig.files.sheet import MOST_FAULTS, ReadingStep, Sheet, Wanted, listed_faults
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, after_lines, fields_of, plain_numbers, text_of
+from pzd.rig.files.sheet import (
+    MOST_BELOW,
+    MOST_FAULTS,
+    NO_SAMPLE,
+    ReadingStep,
+    Sheet,
+    Wanted,
+    listed_faults,
+    told_below,
+    words_below,
+)
 from pzd.schema.errors import DataError, at, counted
 
 if TYPE_CHECKING:
@@ -86,7 +96,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         )
     if numbers.size == 0:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
-    lines, below = _without_words_below(lines, len(header))
+    lines, below = _without_words_below(lines)
     body, numbers = lines.body, lines.numbers
     uneven = lines.fields != len(header)
     trailing = 0
@@ -120,6 +130,8 @@ def _lines_of(path: Path, entry: FilesEntry, wanted: Wanted) -> _Lines:
     """Take a file apart; its text is let go of as soon as that is done, for it is copied more than once."""
     text = text_of(path, entry.encoding)
     below = text[after_lines(text, entry.skip) :]
+    rows = after_lines(below, (entry.header is None) + entry.units_row)
+    below = below[:rows] + plain_numbers(below[rows:])
     quoted = entry.comment is not None or '"' in text
     return _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
 
@@ -228,29 +240,15 @@ def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_
     return "\n".join(rows), uneven
 
 
-_WORDS_ALONE = re.compile(r"[^\d]*[^\W\d_][^\d]*")
-"""A line of words without a digit, as `End of test`."""
-
-
-def _without_words_below(lines: _Lines, width: int) -> tuple[_Lines, list[ReadingStep]]:
-    """Leave out what stands below the last row in words alone, in fewer fields than the header has."""
-    last = int(lines.fields.size)
-    if last <= _MOST_BELOW or lines.fields[-1] >= width:
-        return lines, []
-    rows = lines.body.rsplit("\n", _MOST_BELOW)[1:]
-    while rows and lines.fields[last - 1] < width and (_WORDS_ALONE.fullmatch(rows[-1]) or not rows[-1].strip()):
-        rows.pop()
-        last -= 1
-    count = int(lines.fields.size) - last
+def _without_words_below(lines: _Lines) -> tuple[_Lines, list[ReadingStep]]:
+    """Leave out the lines of words below the last row."""
+    begin = [fields_of(line, lines.separator)[:1] for line in lines.body.rsplit("\n", MOST_BELOW + 1)[1:]]
+    count = words_below([cell[0] if cell else "" for cell in begin])
     if not count:
         return lines, []
+    last = int(lines.fields.size) - count
     kept = lines.body.rsplit("\n", count)[0]
-    told = ReadingStep("left out", None, f"{counted(count, 'line')} of words below the table", "")
-    return replace(lines, body=kept, numbers=lines.numbers[:last], fields=lines.fields[:last]), [told]
-
-
-_MOST_BELOW = 10
-"""Lines of words below a table; more are none."""
+    return replace(lines, body=kept, numbers=lines.numbers[:last], fields=lines.fields[:last]), [told_below(count)]
 
 
 def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_], int]:
@@ -418,16 +416,20 @@ class _Table:
         for column in columns:
             values = np.full(self.lines.size, np.nan)
             first: list[tuple[int, str]] = []
-            bad, grouped, commas = 0, False, False
+            bad, grouped, commas, words = 0, False, False, True
             for row, cell in enumerate(self._cells(column)):
                 try:
                     values[row] = _number(cell, self.decimal)
                 except ValueError:
                     bad += 1
                     first += [(row, cell)] if bad <= MOST_FAULTS else []
-                    grouped, commas = grouped or _GROUPED.fullmatch(cell) is not None, commas or "," in cell
+                    grouped, commas = (
+                        grouped or _GROUPED.fullmatch(cell) is not None,
+                        commas or ("," in cell and self.decimal != ","),
+                    )
+                    words = words and (cell[0].isalpha() or cell.lower() in _NO_VALUE or cell[0] == "#")
             if bad:
-                advice = _advice(grouped=grouped, commas=commas)
+                advice = _advice(grouped=grouped, commas=commas, words=words)
                 if bad == 1 and first[0][0] == 0 and _UNIT_CELL.fullmatch(first[0][1]):
                     advice = "; if this row holds the units, say units_row: true"
                 wrong = [(row, f"a number is needed (got {cell!r}){advice}") for row, cell in first]
@@ -462,8 +464,10 @@ def _number(cell: str, decimal: str) -> float:
     return value
 
 
-def _advice(*, grouped: bool, commas: bool) -> str:
-    """Return what to do about cells that are no numbers, where some are grouped by thousands or have commas."""
+def _advice(*, grouped: bool, commas: bool, words: bool) -> str:
+    """Return what to do about cells that are no numbers: grouped by thousands, with commas, or words all of them."""
     if grouped:
         return "; write the file without grouping thousands"
-    return "; for decimal commas say decimal: ','" if commas else ""
+    if commas:
+        return "; for decimal commas say decimal: ','"
+    return f"; {NO_SAMPLE}" if words else ""
