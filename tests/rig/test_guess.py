@@ -291,6 +291,18 @@ WORLD = {
     "cp1250": ["Czas [s]", "Przemieszczenie [mm]", "Siła [N]", "Napięcie [V]"],
     "utf-8": ["Tempo [s]", "Spostamento [mm]", "Forza [N]", "Tensione [V]"],
     "cp1252": ["Tiempo [s]", "Desplazamiento [mm]", "Fuerza máxima [N]", "Tensión [V]"],
+    "cp1251": [
+        "\u0412\u0440\u0435\u043c\u044f, \u0441",
+        "\u041f\u0435\u0440\u0435\u043c\u0435\u0449\u0435\u043d\u0438\u0435, \u043c\u043c",
+        "\u0423\u0441\u0438\u043b\u0438\u0435, \u041d",
+        "\u041d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438\u0435, \u0412",
+    ],
+        "\u0412\u0440\u0435\u043c\u044f, \u0441",
+        "\u041f\u0435\u0440\u0435\u043c\u0435\u0449\u0435\u043d\u0438\u0435, \u043c\u043c",
+        "\u0423\u0441\u0438\u043b\u0438\u0435, \u041d",
+        "\u041d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438\u0435, \u0412",
+    ],
+    "cp1254": ["Tempo [s]", "Deslocamento [mm]", "Força [N]", "Tensão [V]"],
     "iso8859-15": ["Zeit [s]", "Kolbenweg [mm]", "Dämpferkraft [N]", "Spannung [V]"],
 }
 

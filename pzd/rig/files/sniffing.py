@@ -39,25 +39,32 @@ from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import SPELLINGS, UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 
-# --- Quantity of a column, by its header in English, German, French, Spanish, Italian, Polish, Chinese or Japanese ---
+# --- Quantity of a column, by its header in English and ten languages more ---
 
 _LOOKS_LIKE = {
     TIME: r"^t$|^tout$|^x_value$|^x-axis$|^x_axis$|^epoch|^millis|^micros"
     r"|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
-    r"|\u65f6\u95f4|\u6642\u9593",
+    r"|\u65f6\u95f4|\u6642\u9593|^\u0432\u0440\u0435\u043c",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera"
-    r"|spostament|corsa|przemieszcz|^skok|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
-    VELOCITY: r"^v$|vel|speed|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6",
+    r"|spostament|corsa|desloca|^curso|przemieszcz|^skok"
+    r"|\u043f\u0435\u0440\u0435\u043c\u0435\u0449|\u0441\u043c\u0435\u0449|^\u0445\u043e\u0434"
+    r"|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
+    VELOCITY: r"^v$|vel|speed|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6"
+    r"|\u0441\u043a\u043e\u0440\u043e\u0441\u0442",
     ACCELERATION: r"^a$|acc|beschl|acel|przyspiesz|\u52a0\u901f\u5ea6",
     FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga|forza|carico|^si[lł]a|(?<![\u538b\u5727])\u529b"
-    r"|\u8f7d\u8377|\u8377\u91cd|\u8d1f\u8377",
-    TEMPERATURE: r"temp(?!s\b|o\b)|t[eé]mp[eé]r|\u6e29\u5ea6|\u6eab\u5ea6",
-    PRESSURE: r"^p$|press|druck|presi|ci[sś]nieni|\u538b\u529b|\u5727\u529b",
+    r"|\u8f7d\u8377|\u8377\u91cd|\u8d1f\u8377|^\u0441\u0438\u043b|\u0443\u0441\u0438\u043b\u0438|\u043d\u0430\u0433\u0440\u0443\u0437\u043a",
+    TEMPERATURE: r"temp(?!s\b|o\b)|t[eé]mp[eé]r|\u6e29\u5ea6|\u6eab\u5ea6"
+    r"|\u0442\u0435\u043c\u043f\u0435\u0440\u0430\u0442\u0443\u0440",
+    PRESSURE: r"^p$|press|druck|presi|ci[sś]nieni|\u538b\u529b|\u5727\u529b"
+    r"|\u0434\u0430\u0432\u043b\u0435\u043d\u0438",
 }
 """Headers of each quantity, without a unit in brackets."""
 CONTROLS = {
-    Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|\u7535\u538b|\u96fb\u5727",
-    Control("current", "A"): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41",
+    Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|tens[aã]o|\u7535\u538b|\u96fb\u5727|\u043d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438",
+    Control(
+        "current", "A"
+    ): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41|^\u0442\u043e\u043a",
 }
 """Headers of the control signal."""
 REBOUND, COMPRESSION = "rebound", "compression"
@@ -82,7 +89,7 @@ _CONTROLS_WITH_UNIT = {
     Control("current", "A"): "^i$|ctrl|control|valve|coil",
 }
 """Symbols of the control signal where a unit of it follows: `U_V`, `ctrl [V]`, `Coil/A`."""
-_LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
+_LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%\u0400-\u04ff][A-Za-zµ°/²^0-9\u0400-\u04ff]*)$")
 _DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | dict.fromkeys(("F", "°F", "deg F"), "degF")
 """Spellings of degrees that pint does not know, or takes for coulombs and farads."""
 
@@ -444,7 +451,7 @@ def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
     return found[1] if found else None
 
 
-_CODE_PAGES = ("latin-1", "cp1250", "gbk", "shift_jis")
+_CODE_PAGES = ("latin-1", "cp1250", "cp1251", "gbk", "shift_jis")
 """Encodings that are tried where a text is neither UTF-8 nor UTF-16; the one in which most headers mean something."""
 
 
