@@ -61,7 +61,8 @@ _LOOKS_LIKE = {
 }
 """Headers of each quantity, without a unit in brackets."""
 CONTROLS = {
-    Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|tens[aã]o|\u7535\u538b|\u96fb\u5727|\u043d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438",
+    Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|tens[aã]o|\u7535\u538b|\u96fb\u5727"
+    r"|\u043d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438",
     Control(
         "current", "A"
     ): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41|^\u0442\u043e\u043a",
