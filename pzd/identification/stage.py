@@ -125,8 +125,8 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
                 more = f" and {counted(len(without) - 1, 'more test')}" if len(without) > 1 else ""
                 raise DataError(
                     f"{without[0]}{more}: no {name}, which other tests of the setting have: say what it was, "
-                    f"constants: {{{name}: ... {unit}}}, or leave it out of all, columns: {{{name}: ''}}; of a pzd.Test "
-                    f"by its {name}"
+                    f"constants: {{{name}: ... {unit}}}, or leave it out of all, columns: {{{name}: ''}}; "
+                    f"of a pzd.Test by its {name}"
                 )
 
 

@@ -449,6 +449,20 @@ def test_whole_seconds_as_stamps_tell_the_rate_of_the_samples_between_them(tmp_p
         ingest(config, Control(), tmp_path)
 
 
+def test_a_level_among_the_attributes_of_an_hdf5_group_is_that_of_its_test(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for level in (0.0, 0.5):
+            group = file.create_group(f"run{level}")
+            group.attrs["current_A"], group.attrs["operator"], group.attrs["cycles"] = level, "N. N.", 4
+            for name, values in (("time_s", TIME), ("position_mm", MM), ("load_N", FORCE)):
+                group[name] = values
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([tmp_path / "a.h5"])), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    entries = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert [entry.voltage_V for entry in entries] == [0.0, 0.5]
+
+
 def test_an_index_of_instants_without_a_name_is_the_clock_of_a_parquet(tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     index = pd.Timestamp("2026-11-27T09:30:00.1+01:00") + pd.to_timedelta(TIME, unit="s")

@@ -1,6 +1,7 @@
 """HDF5, among it MATLAB files of version 7.3: data sets of one length in one group are the columns of one table.
 
-The unit of a column is the attribute `unit` or `units` of its data set. MATLAB stores texts as the numbers of their
+The unit of a column is the attribute `unit` or `units` of its data set; a number among the attributes of a group is
+that of all its rows. MATLAB stores texts as the numbers of their
 characters, and a matrix turned over, which does not matter: the longer side is time.
 """
 
@@ -55,7 +56,16 @@ def _tree(group: Any, file: Any) -> dict[str, Any]:
         elif (value := _followed(item, file)) is not None:
             unit = next((_text(item.attrs[key]) for key in ("unit", "units") if key in item.attrs), None)
             found[name] = {"values": value, "unit": unit} if unit is not None else value
-    return found
+    return _numbers_of(group) | found
+
+
+def _numbers_of(group: Any) -> dict[str, float]:
+    """Return the attributes of a group that are one number each, as the level of a test is written down."""
+    return {
+        name: float(value)
+        for name, value in group.attrs.items()
+        if not name.startswith("MATLAB_") and getattr(value, "size", 0) == 1 and value.dtype.kind in "iuf"
+    }
 
 
 def _structures(fields: dict[str, Any]) -> Any:
