@@ -56,7 +56,7 @@ _LOOKS_LIKE = {
     r"|\u8f7d\u8377|\u8377\u91cd|\u8d1f\u8377|^\u0441\u0438\u043b|\u0443\u0441\u0438\u043b\u0438|\u043d\u0430\u0433\u0440\u0443\u0437\u043a",
     TEMPERATURE: r"temp(?!s\b|o\b)|t[eé]mp[eé]r|\u6e29\u5ea6|\u6eab\u5ea6"
     r"|\u0442\u0435\u043c\u043f\u0435\u0440\u0430\u0442\u0443\u0440",
-    PRESSURE: r"^p$|press|druck|presi|ci[sś]nieni|\u538b\u529b|\u5727\u529b"
+    PRESSURE: r"^p$|(?<!com)press|druck|presi|ci[sś]nieni|\u538b\u529b|\u5727\u529b"
     r"|\u0434\u0430\u0432\u043b\u0435\u043d\u0438",
 }
 """Headers of each quantity, without a unit in brackets."""

@@ -1,8 +1,8 @@
 """HDF5, among it MATLAB files of version 7.3: data sets of one length in one group are the columns of one table.
 
 The unit of a column is the attribute `unit` or `units` of its data set; a number among the attributes of a group is
-that of all its rows. MATLAB stores texts as the numbers of their
-characters, and a matrix turned over, which does not matter: the longer side is time.
+that of all its rows. MATLAB stores texts as the numbers of their characters, and a matrix turned over, which does not
+matter: the longer side is time.
 """
 
 from __future__ import annotations
