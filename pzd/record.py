@@ -63,7 +63,7 @@ class Record:
 
     def median_voltage(self) -> float | None:
         """Return the median voltage [V], None where none was recorded."""
-        return None if self.voltage is None else float(np.median(self.voltage))
+        return None if self.voltage is None else float(np.median(without_ripple(self.voltage, self.time)))
 
     def median_temperature(self) -> float | None:
         """Return the median temperature [degC], None where none was recorded."""
@@ -173,6 +173,28 @@ def without_glitches(values: Array) -> Array:
     return np.delete(values, rows) if rows.size else values
 
 
+RIPPLE_SHARE = 0.1
+"""Largest r.m.s. of a ripple about a constant voltage, as a share of it.
+
+Reason: drivers of coils chop their current by a few hundredths; more is set on purpose."""
+RIPPLE_WITHIN = 0.1
+"""Time over which a ripple cancels [s]: some periods of the mains and thousands of a chopper, little of a motion."""
+
+
+def without_ripple(voltage: Array, time: Array) -> Array:
+    """Return a voltage (n,) that ripples about a level as its means over pieces of time, (m,); any other as it is.
+
+    The median of a current that a driver chops is one of its two values, and by chance which.
+    """
+    middle = float(np.median(voltage))
+    spread = float(np.sqrt(np.mean((without_glitches(voltage) - middle) ** 2)))
+    if not CONSTANT_SHARE * abs(middle) < spread <= RIPPLE_SHARE * abs(middle):
+        return voltage
+    pieces = np.floor((time - time[0]) / RIPPLE_WITHIN).astype(np.intp)
+    count = np.bincount(pieces)
+    return np.asarray(np.bincount(pieces, voltage)[count > 0] / count[count > 0])
+
+
 def mid_stroke(displacements: Iterable[Array]) -> float:
     """Return the middle of the range of displacement that several tests cover [m], each (n,) as recorded."""
     ends = [end(displacement) for displacement in displacements for end in (np.min, np.max)]
@@ -205,10 +227,14 @@ def distinct(records: Sequence[Record]) -> tuple[Record, ...]:
 
 
 def is_constant(record: Record, scale: float) -> bool:
-    """Tell whether the voltage stands still: r.m.s. about the median within 2 % of the scale, glitches left out."""
+    """Tell whether the voltage stands still: r.m.s. about the median within 2 % of the scale.
+
+    Glitches are left out, and what ripples about a level faster than a damper moves.
+    """
     if record.voltage is None:
         return True
-    deviation = without_glitches(record.voltage) - np.median(record.voltage)
+    steady = without_ripple(record.voltage, record.time)
+    deviation = without_glitches(steady) - np.median(steady)
     return bool(np.sqrt(np.mean(deviation**2)) <= CONSTANT_SHARE * scale)
 
 
@@ -283,7 +309,7 @@ def _median_level(values: Array, finest: float) -> float:
 
 def _condition(setting: str | None, members: Sequence[Record], finest: tuple[float, float]) -> Condition:
     """Make a condition of equal records; `finest` is the smallest difference of voltage and temperature that counts."""
-    voltages = [r.voltage for r in members if r.voltage is not None]
+    voltages = [without_ripple(r.voltage, r.time) for r in members if r.voltage is not None]
     temperatures = [r.temperature for r in members if r.temperature is not None]
     return Condition(
         setting,

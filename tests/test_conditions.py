@@ -50,3 +50,27 @@ def test_evenly_spaced_temperatures_are_split_alike_from_either_end(sign: float)
     still = np.full(TIME.size, 75.0)
     found, _ = conditions([record(f"{T}", still, np.full(TIME.size, sign * T)) for T in (20.0, 21.0, 22.0, 23.0)])
     assert [len(each.records) for each in found] == [2, 2]
+
+
+@pytest.mark.parametrize("kind", ["mains", "chopped", "noise"])
+def test_a_current_that_ripples_about_a_level_is_constant_and_has_that_level(
+    kind: str, rng: np.random.Generator
+) -> None:
+    """A driver chops its current: the median of two values is one of them, and by chance which."""
+    ripple = {
+        "mains": 0.06 * np.sin(2.0 * np.pi * 60.0 * TIME),
+        "chopped": np.where((TIME * 90.0) % 1.0 < 0.5, 0.06, -0.06),
+        "noise": 0.05 * rng.standard_normal(TIME.size),
+    }[kind]
+    records = [record(f"{u}{side}", u * (1.0 + side * ripple)) for u in (0.5, 1.0) for side in (1.0, -1.0)]
+    found, moving = conditions([record("0", np.zeros(TIME.size)), *records])
+    assert [each.voltage for each in found] == pytest.approx([0.0, 0.5, 1.0], rel=5e-3)
+    assert moving == ()
+
+
+@pytest.mark.parametrize(
+    "course",
+    [1.0 + 0.05 * np.sin(2.0 * np.pi * TIME), np.linspace(0.95, 1.05, TIME.size), np.where(TIME < 1.0, 0.9, 1)],
+)
+def test_a_current_that_swings_no_faster_than_a_damper_moves_is_not_constant(course: Array) -> None:
+    assert conditions([record("a", course)])[1]

@@ -321,7 +321,9 @@ def test_a_bad_cell_is_named_by_sheet_and_row(tmp_path: Path) -> None:
     holes[7] = np.nan
     parquet(tmp_path / "b.parquet", COLUMNS | {"load": holes})
     (said,) = refused(tmp_path, {"path": "b.parquet"} | NAMED)
-    assert said.endswith("b.parquet: row 8: load: empty cell")
+    assert said.endswith(
+        "b.parquet: row 8: load: empty cell; take a row without a value out: it is told as a lost sample"
+    )
 
 
 def test_a_row_of_a_block_that_is_cut_short_is_named_by_its_line(tmp_path: Path) -> None:
@@ -366,7 +368,9 @@ def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_a
         file.append(signals)
         file.save(tmp_path / "a.mf4")
     (said,) = refused(tmp_path, entry)
-    assert said.endswith("row 5: load: empty cell (2 such cells)")
+    assert said.endswith(
+        "row 5: load: empty cell (2 such cells); take a row without a value out: it is told as a lost sample"
+    )
     with MDF(version="4.10") as file:
         file.append([*signals[:1], Signal(KN, TIME, unit="kN", name="load"), Signal(MM, TIME, unit="kN", name="load")])
         file.save(tmp_path / "a.mf4", overwrite=True)

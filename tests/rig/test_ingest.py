@@ -308,7 +308,7 @@ def test_a_clock_of_too_few_digits_is_reported_with_what_to_do_about_it(tmp_path
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.array([float(f"{t:.5g}") for t in later])}))
     (said,) = refused(tmp_path)
     assert "a.csv:3: time does not increase: 10 s after 10 s, and " in said
-    assert "; it has too few digits; say rate_Hz: 3006 or what is known of it, and leave out the column" in said
+    assert "; it has too few digits; say rate_Hz: 3000 or what is known of it, and leave out the column" in said
 
 
 def test_a_clock_that_never_goes_on_is_reported_no_rate(tmp_path: Path) -> None:
