@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from written_files import FORCE, TIME, X, lines, refused, run, write, wrong
+from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.damper.element import element_force
 from pzd.record import Array
@@ -172,3 +172,26 @@ def test_a_clock_of_too_few_digits_is_counted_as_the_refusal_says(tmp_path: Path
     for columns in ({}, {"columns": {"time": ""}}):
         (entry,) = run(tmp_path, {"path": "a.csv", "rate_Hz": float(rate), **columns}).entries
         assert entry.rate_Hz == pytest.approx(3000.0, rel=5e-3)
+
+
+def test_a_clock_that_begins_again_is_another_test_and_the_column_that_numbers_them_cuts_it(tmp_path: Path) -> None:
+    numbers = np.repeat([1.0, 2.0], TIME.size)
+    columns = {"Test No": numbers} | {name: np.tile(values, 2) for name, values in CANONICAL.items()}
+    write(tmp_path / "a.csv", lines(columns))
+    (said,) = refused(tmp_path)
+    assert "another test begins there; say split: {column: HEADER} with the column that numbers the tests" in said
+    assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "Test No"}}).records) == 2
+
+
+def test_rows_that_repeat_a_time_or_run_backwards_are_told_as_such_and_what_is_advised_is_accepted(
+    tmp_path: Path,
+) -> None:
+    text = lines(CANONICAL)
+    write(tmp_path / "a.csv", [*text[:3], text[2], text[2], *text[3:]])
+    (said,) = refused(tmp_path)
+    assert said.endswith("; take the rows that repeat a time out")
+    write(tmp_path / "a.csv", [text[0], *text[:0:-1]])
+    (said,) = refused(tmp_path)
+    assert said.endswith("; the rows run backwards: turn them round")
+    write(tmp_path / "a.csv", text)
+    assert len(run(tmp_path).records) == 1

@@ -57,8 +57,17 @@ def standstills(test: RawRecord) -> list[str]:
         return []
     told = f"{test.place(fault[0])}: {fault[1]}"
     steps = np.diff(time)
-    if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
+    if steps.max() < 0.0:
+        return [f"{told}; the rows run backwards: turn them round"]
+    if steps.max() == 0.0:
         return [told]
+    if steps.min() < 0.0:
+        when = "with the column that numbers the tests, or write each into a file of its own"
+        begins = bool(np.all(time[1:][steps < 0.0] < time[:-1][steps < 0.0] - 0.5 * np.ptp(time)))
+        again = Advised(f"{told}; another test begins there;", Advice("split", "{column: HEADER}", when=when))
+        return [again if begins else told]
+    if np.mean(steps == 0.0) < OFTEN:
+        return [f"{told}; take the rows that repeat a time out"]
     goes_on = np.flatnonzero(steps > 0.0) + 1  # the first stamp and the last may not be whole ones
     first, last = (goes_on[0], goes_on[-1]) if goes_on.size > 1 else (0, time.size - 1)
     rate = (last - first) / (time[last] - time[first])
