@@ -10,11 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from pzd.artefacts import Finding
+from pzd.artefacts import Finding, RecordEntry
 from pzd.damper.element import element_force
 from pzd.record import Record
 from pzd.rig.config import Limits
 from pzd.rig.preflight import PreflightRecord, checks, findings
+from pzd.rig.preflight.sense import unseen_levels
 from pzd.signals.cycles import Cycles, cycles
 from pzd.signals.kinematics import kinematics
 
@@ -321,3 +322,27 @@ def test_a_coarse_clock_leaves_the_sampling_rate_as_it_is(rate: float, rng: np.r
     time = np.arange(one.time.size) / rate
     time[time.size // 2 :] += 3.0  # and a gap, which says nothing of the rate
     assert replace(one, time=np.round(time, 4)).rate == pytest.approx(rate, rel=1e-4)
+
+
+def entries_of(**forces: tuple[float, float, float | None]) -> tuple[RecordEntry, ...]:
+    """Entries by name: force [N], displacement [m] and voltage [V]; every motion at one frequency."""
+    return tuple(
+        RecordEntry(
+            name=name, setting=None, voltage_V=voltage, temperature_degC=None, rate_Hz=500.0, cycles=8.0,
+            displacement_rms_m=x, velocity_rms_m_per_s=6.0 * x, acceleration_rms_m_per_s2=36.0 * x,
+            force_rms_N=force, force_peak_N=1.5 * force, work_J=1.0, findings=(),
+        )
+        for name, (force, x, voltage) in forces.items()
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("volts", [(None, None), (10.0, 10.1), (None, 10.0)])
+def test_a_force_much_larger_than_in_the_same_motion_is_that_of_another_level(volts: tuple[float | None, ...]) -> None:
+    found = unseen_levels(entries_of(a=(400.0, 0.01, volts[0]), b=(800.0, 0.01, volts[1]), c=(900.0, 0.02, volts[1])))
+    assert [[finding.check for finding in entry.findings] for entry in found] == [[], ["level"], []]
+    assert "where a has 400 N in the same motion" in found[1].findings[0].where
+
+
+def test_two_levels_two_motions_and_a_damper_that_warms_are_no_unseen_level() -> None:
+    known = entries_of(a=(400.0, 0.01, 0.0), b=(800.0, 0.01, 10.0), c=(800.0, 0.02, 0.0), d=(480.0, 0.01, 0.0))
+    assert unseen_levels(known) == known

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Finding, RecordEntry
+from pzd.record import CONSTANT_SHARE
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.measures import chance_work, work
 
@@ -142,5 +143,55 @@ def _mixed(entry: RecordEntry, others: list[RecordEntry]) -> Iterator[Finding]:
         )
 
 
+SAME_MOTION = 0.01
+"""Relative difference of r.m.s. displacement and speed up to which two tests ran the same motion."""
+ANOTHER_LEVEL = 1.3
+"""Ratio of the forces of one motion from which they are of two levels: warming and repeats stay below."""
+
+SAME_TEMPERATURE_SHARE = 0.1
+"""Relative difference of temperatures in degC up to which an oil is as thick: two kelvin at room temperature."""
+
+
+def unseen_levels(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """Find tests whose force is much larger than that of another one of the same motion and conditions."""
+    return tuple(
+        entry.model_copy(update={"findings": (*entry.findings, *_another_level(entry, entries))}) for entry in entries
+    )
+
+
+def _another_level(entry: RecordEntry, entries: tuple[RecordEntry, ...]) -> Iterator[Finding]:
+    forces = {other.name: other.force_rms_N for other in entries if other.force_rms_N and _one_condition(entry, other)}
+    if not entry.force_rms_N or not forces:
+        return
+    least = min(forces, key=lambda name: forces[name])
+    ratio = entry.force_rms_N / forces[least]
+    if ANOTHER_LEVEL < ratio < MIXED[0]:
+        yield Finding(
+            check="level",
+            where=f"force, r.m.s. {entry.force_rms_N:.4g} N, where {least} has {forces[least]:.4g} N in the "
+            "same motion",
+            size=ratio,
+            unit="-",
+            follows="one fit to both is neither: if a control signal, a setting or a temperature differed, say which, "
+            "by columns, constants, pattern or setting",
+        )
+
+
+def _one_condition(one: RecordEntry, other: RecordEntry) -> bool:
+    """Whether two tests ran the same motion, at one control signal and temperature as far as they are known."""
+    return (
+        one.setting == other.setting
+        and _near(one.displacement_rms_m, other.displacement_rms_m, SAME_MOTION)
+        and _near(one.velocity_rms_m_per_s, other.velocity_rms_m_per_s, SAME_MOTION)
+        and _near(one.voltage_V, other.voltage_V, CONSTANT_SHARE)
+        and _near(one.temperature_degC, other.temperature_degC, SAME_TEMPERATURE_SHARE)
+    )
+
+
+def _near(a: float | None, b: float | None, share: float) -> bool:
+    """Whether two values are within a share of the larger, or one is not known."""
+    return a is None or b is None or abs(a - b) <= share * max(abs(a), abs(b))
+
+
 CHECKS = (sign, scale)
-COMPARISONS = (mixed_units,)
+COMPARISONS = (mixed_units, unseen_levels)
