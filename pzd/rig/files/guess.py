@@ -246,15 +246,15 @@ def _keys(
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         yield from _asked_columns(files[0], columns, missing, several)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
-    if not pattern and VOLTAGE not in columns and (doubt := doubt_in_names([file.path.stem for file in files])):
-        units.append(f"  {doubt[0]}: {doubt[1]}")
+    doubt = None if pattern or VOLTAGE in columns else doubt_in_names([file.path.stem for file in files])
+    units += [f"  {doubt[0]}: {doubt[1]}"] if doubt else []
     units += list(_asked_units(files[0], columns, [q for q in missing if q not in several]))
     if units:
         yield "units:"
         yield from units
     if pattern:
         yield _pattern_key(pattern)
-    elif VOLTAGE not in columns and (doubt := doubt_in_names([file.path.stem for file in files])):
+    elif doubt:
         yield _asked_pattern(*doubt)
     yield from _events(files[0])
     if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
