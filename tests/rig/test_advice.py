@@ -314,3 +314,13 @@ def test_numbers_beyond_all_measure_are_refused_without_a_warning(tmp_path: Path
             guessed([tmp_path / "a.csv"])
             said = refused(tmp_path, {"path": "a.csv", "columns": {"force": "F"}, "units": {"force": unit}})
             assert any("no force is so large" in one for one in said)
+
+
+def test_files_recorded_the_other_way_beside_others_are_told_to_need_an_entry_of_their_own(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL))
+    write(tmp_path / "b.csv", lines(CANONICAL | {"force_N": -FORCE}))
+    (said,) = refused(tmp_path)
+    assert "and in 1 other test of this entry it does none: it needs an entry of its own" in said
+    (sign,) = re.findall(r"say sign: \{force: (-?1)\}", said)
+    rig = run(tmp_path, {"path": "a.csv"}, {"path": "b.csv", "sign": {"force": int(sign)}})
+    assert np.allclose(rig.records[0].force, rig.records[1].force)

@@ -14,7 +14,7 @@ from pzd.record import Array
 from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.clock import clock_faults, standstills
 from pzd.rig.files.layout import ChannelSpec, Layout
-from pzd.schema.errors import Advice, Advised, DataError
+from pzd.schema.errors import Advice, Advised, DataError, counted
 from pzd.schema.yamltree import written
 from pzd.signals.measures import REVERSAL_SHARE, chance_work, despiked, reversals, rms, slope, work
 
@@ -60,6 +60,9 @@ def sign_faults(
         channel, why = hint if hint[0] == usual else next(one for one in mates if one[0] == usual)
         done = work(alone.displacement, alone.force)
         what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
+        right = sum(layout_of[other.sheet.path] is layout for other, _ in others)
+        if right:
+            what += f", and in {counted(right, 'other test')} of this entry it does none: it needs an entry of its own"
         signs = {spec.quantity.name: -spec.sign for spec in layout.channels}
         turned = {name: Advice("sign", str(signs[name]), name) for name in (DISPLACEMENT.name, FORCE.name)}
         if _exchanged(alone):
