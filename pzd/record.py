@@ -190,9 +190,8 @@ def without_ripple(voltage: Array, time: Array) -> Array:
     spread = float(np.sqrt(np.mean((without_glitches(voltage) - middle) ** 2)))
     if not CONSTANT_SHARE * abs(middle) < spread <= RIPPLE_SHARE * abs(middle):
         return voltage
-    pieces = np.floor((time - time[0]) / RIPPLE_WITHIN).astype(np.intp)
-    count = np.bincount(pieces)
-    return np.asarray(np.bincount(pieces, voltage)[count > 0] / count[count > 0])
+    _, pieces, count = np.unique(np.floor((time - time[0]) / RIPPLE_WITHIN), return_inverse=True, return_counts=True)
+    return np.asarray(np.bincount(pieces, voltage) / count)
 
 
 def mid_stroke(displacements: Iterable[Array]) -> float:

@@ -401,7 +401,10 @@ def test_a_typographic_minus_and_marks_between_thousands_are_no_part_of_a_number
 
 @pytest.mark.parametrize("ending", ["csv", "xlsx"])
 def test_extremes_and_a_remark_below_the_table_are_left_out_and_told(tmp_path: Path, ending: str) -> None:
-    head, below = ("Time [s]", "Stroke [mm]", "Force [N]"), (("Max", 15, 300.5), ("Min", -15, -300.5), ("Warm oil",))
+    head, below = (
+        ("Time [s]", "Stroke [mm]", "Force [N]"),
+        (("Max", 15, 300.5), ("Min", -15, -300.5), ("-- Warm oil --",)),
+    )
     path = tmp_path / f"a.{ending}"
     if ending == "csv":
         text = [",".join(head), *table(TIME, MM, FORCE), "", *(",".join(map(str, row)) for row in below)]

@@ -24,7 +24,7 @@ from pzd.quantities import (
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import BLANKS, after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
-from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, own_quantity
+from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
 from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (
@@ -202,7 +202,7 @@ def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, st
     if found is None:
         return {}
     values = ((folder, re.search(found[0], folder.name)) for folder in folders)
-    return {folder: f"{match[1].replace('x', '.').replace('p', '.')} {found[1]}" for folder, match in values if match}
+    return {folder: f"{number_in_name(match[1])} {found[1]}" for folder, match in values if match}
 
 
 def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:

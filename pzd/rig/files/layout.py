@@ -153,7 +153,7 @@ class Layout:
                     f"{self.place}.units: {own.name}: the file's name has no unit; say {own.name}: {own.unit}"
                 )
                 continue
-            number = re.sub(r"(?<=\d)[xp,_-](?=\d)", ".", text)
+            number = number_in_name(text)
             at_place = f"{self.place}.pattern: {path.name}"
             values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
         return values
@@ -166,6 +166,11 @@ def _whole_number(name: str, first: int, last: int) -> str:
     before = re.search(r"(?:\d+[.,xp]|\d+)?$", name[:first]) if name[first].isdigit() else None
     after = re.match(r"\d*(?:[.,xp]\d+)?", name[last:]) if name[last - 1].isdigit() else None
     return (before[0] if before else "") + name[first:last] + (after[0] if after else "")
+
+
+def number_in_name(text: str) -> str:
+    """Return a number as it stands in a name with a decimal point: 0x5, 0p5, 0_5 or 0,5 is 0.5."""
+    return re.sub(r"(?<=\d)[xp,_-](?=\d)", ".", text)
 
 
 def minus_before(name: str, first: int) -> bool:

@@ -293,6 +293,10 @@ MOST_BELOW = 10
 """Lines of words below a table; more are none."""
 
 
+_WORDS_ALONE = re.compile(r"[^\d]*[^\W\d_][^\d]*")
+"""Words without a digit, as `--- End of test ---`."""
+
+
 def words_below(first: Sequence[str]) -> int:
     """Return how many rows at the end of a table say something in words: its extremes, a remark, `End of test`.
 
@@ -307,7 +311,7 @@ def words_below(first: Sequence[str]) -> int:
     """
     count, words = 0, False
     for cell in reversed(first):
-        if cell and not cell[0].isalpha():
+        if cell and not (cell[0].isalpha() or _WORDS_ALONE.fullmatch(cell)):
             return count if words else 0
         count, words = count + 1, words or bool(cell)
     return 0

@@ -39,7 +39,7 @@ from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import SPELLINGS, UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 
-# --- Quantity of a column, by its header in English and ten languages more ---
+# --- Quantity of a column, by its header in ten languages: de en es fr it ja pl pt ru zh ---
 
 _LOOKS_LIKE = {
     TIME: r"^t$|^tout$|^x_value$|^x-axis$|^x_axis$|^epoch|^millis|^micros"
@@ -123,7 +123,7 @@ _NOT_THE_ONE = re.compile(
     r"|abweichung"
     r"|\u6307\u4ee4|\u8bbe\u5b9a|\u76ee\u6a19|\u76ee\u6807"
 )
-"""Words of a header that was demanded and not measured, or that acts across the stroke."""
+"""Words in the header of what was demanded and not measured, acts across the stroke, or is a part of the force."""
 
 
 def claims(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> dict[Quantity, list[str]]:

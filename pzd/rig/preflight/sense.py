@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Finding, RecordEntry
-from pzd.record import CONSTANT_SHARE
+from pzd.record import SAME_TEMPERATURE
 from pzd.rig.preflight import PreflightRecord
 from pzd.signals.measures import chance_work, work
 
@@ -148,12 +148,9 @@ SAME_MOTION = 0.01
 ANOTHER_LEVEL = 1.3
 """Ratio of the forces of one motion from which they are of two levels: warming and repeats stay below."""
 
-SAME_TEMPERATURE_SHARE = 0.1
-"""Relative difference of temperatures in degC up to which an oil is as thick: two kelvin at room temperature."""
-
 
 def unseen_levels(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
-    """Find tests whose force is much larger than that of another one of the same motion and conditions."""
+    """Find tests without a control signal whose force is much larger than that of another one of the same motion."""
     return tuple(
         entry.model_copy(update={"findings": (*entry.findings, *_another_level(entry, entries))}) for entry in entries
     )
@@ -178,19 +175,18 @@ def _another_level(entry: RecordEntry, entries: tuple[RecordEntry, ...]) -> Iter
 
 
 def _one_condition(one: RecordEntry, other: RecordEntry) -> bool:
-    """Whether two tests ran the same motion, at one control signal and temperature as far as they are known."""
+    """Whether two tests ran the same motion at one temperature, if known, and no control signal tells them apart."""
+    warmth, other_warmth = one.temperature_degC, other.temperature_degC
+    motions = (
+        (one.displacement_rms_m, other.displacement_rms_m),
+        (one.velocity_rms_m_per_s, other.velocity_rms_m_per_s),
+    )
     return (
         one.setting == other.setting
-        and _near(one.displacement_rms_m, other.displacement_rms_m, SAME_MOTION)
-        and _near(one.velocity_rms_m_per_s, other.velocity_rms_m_per_s, SAME_MOTION)
-        and _near(one.voltage_V, other.voltage_V, CONSTANT_SHARE)
-        and _near(one.temperature_degC, other.temperature_degC, SAME_TEMPERATURE_SHARE)
+        and None in (one.voltage_V, other.voltage_V)
+        and (warmth is None or other_warmth is None or abs(warmth - other_warmth) <= SAME_TEMPERATURE)
+        and all(a is not None and b is not None and abs(a - b) <= SAME_MOTION * max(a, b) for a, b in motions)
     )
-
-
-def _near(a: float | None, b: float | None, share: float) -> bool:
-    """Whether two values are within a share of the larger, or one is not known."""
-    return a is None or b is None or abs(a - b) <= share * max(abs(a), abs(b))
 
 
 CHECKS = (sign, scale)

@@ -423,10 +423,8 @@ class _Table:
                 except ValueError:
                     bad += 1
                     first += [(row, cell)] if bad <= MOST_FAULTS else []
-                    grouped, commas = (
-                        grouped or _GROUPED.fullmatch(cell) is not None,
-                        commas or ("," in cell and self.decimal != ","),
-                    )
+                    grouped = grouped or _GROUPED.fullmatch(cell) is not None
+                    commas = commas or ("," in cell and self.decimal != ",")
                     words = words and (cell[0].isalpha() or cell.lower() in _NO_VALUE or cell[0] == "#")
             if bad:
                 advice = _advice(grouped=grouped, commas=commas, words=words)
