@@ -29,6 +29,7 @@ from pzd.diagnosis.fit.prediction import comparable_samples, simulation_motion
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.candidates import (
     Candidate,
+    Promise,
     candidate,
     most_promising,
     per_voltage_candidates,
@@ -151,7 +152,8 @@ class PredictiveSearch:
     ) -> list[Candidate]:
         """Fit the most promising effects beside those of a fit, either those that are asked last or all others.
 
-        What begins at some displacement is not tried: it would grow beyond the recorded stroke, where no test shows it.
+        Until so many move the force visibly: what comes to nothing takes no place from the next one. What begins at
+        some displacement is not tried: it would grow beyond the recorded stroke, where no test shows it.
         """
         if len(fitted.effects) >= self.most_effects:
             return []
@@ -164,12 +166,27 @@ class PredictiveSearch:
             and not effect.needs_displacement_zero
             and testable(problem, effect)
         ]
-        campaign = self.validation.campaign
-        promises = most_promising(problem, fitted, new, self.reached, campaign.jobs)[:count]
-        tried = campaign.parallel_map(lambda each: candidate(each.problem, fitted, each.effect, each.start), promises)
-        self.reached.update((each.effect, each.fitted.optimum[fitted.optimum.size :]) for each in tried)
-        pairs = zip(tried, promises, strict=True)
+        promises = most_promising(problem, fitted, new, self.reached, self.validation.campaign.jobs)
+        found: list[Candidate] = []
+        while promises and (places := count - sum(self._moves_force(each) for each in found)):
+            found += self._tried(problem, fitted, promises[:places])
+            promises = promises[places:]
+        return found
+
+    def _tried(self, problem: Problem, fitted: FitResult, promises: Sequence[Promise]) -> list[Candidate]:
+        """Fit effects beside those of a fit, and remember the values that they reached.
+
+        Not of what came to nothing: from there a linearised step promises what no search keeps.
+        """
+        fits = self.validation.campaign.parallel_map(
+            lambda each: candidate(each.problem, fitted, each.effect, each.start), promises
+        )
+        self.reached.update((c.effect, c.fitted.optimum[fitted.optimum.size :]) for c in fits if self._moves_force(c))
+        pairs = zip(fits, promises, strict=True)
         return [replace(each, varies=promise.problem is not problem) for each, promise in pairs]
+
+    def _moves_force(self, found: Candidate) -> bool:
+        return found.explained >= self.config.visible
 
     def _possible(self, problem: Problem, found: Sequence[Candidate]) -> list[_Proposal]:
         """Return the candidates that move the force visibly, with values that nature has and the tests determine.
@@ -179,7 +196,7 @@ class PredictiveSearch:
         """
 
         def proposal(each: Candidate) -> _Proposal | None:
-            if each.explained < self.config.visible or against_nature(each.fitted.damper):
+            if not self._moves_force(each) or against_nature(each.fitted.damper):
                 return None
             own = problem_for(problem, library()[each.effect])  # it may have fewer base rows
             own = replace(own, per_voltage=own.per_voltage | ({each.effect} if each.varies else set()))

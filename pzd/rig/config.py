@@ -34,8 +34,16 @@ def _filled_in(what: str) -> BeforeValidator:
     return BeforeValidator(checked)
 
 
+def _not_empty(value: object) -> object:
+    if value == "":
+        raise ValueError("is empty; fill in one of the answers beside it, or take the line out")
+    return value
+
+
 Header = Annotated[str, _filled_in("the header of its column in the files")]
 Unit = Annotated[str, _filled_in("its unit in the files, e.g. s, mm, kN, V, degC")]
+Searched = Annotated[str, BeforeValidator(_not_empty)]
+"""A regular expression."""
 WithUnit = Annotated[str, BeforeValidator(_text)]
 """A number with its unit, like `100 V`."""
 
@@ -167,9 +175,12 @@ class FilesEntry(Frozen):
     """Quantity -> value with unit (`100 V`) that no column holds."""
     sign: dict[str, Literal[1, -1]] = Field(default={})
     """Quantity -> 1 or -1; -1 turns a channel that counts compression positive."""
-    pattern: str | None = Field(default=None, min_length=1)
+    pattern: Searched | None = None
     """Regular expression searched in the file's name, its groups named after quantities or `setting`,
     e.g. `(?P<voltage>[0-9.]+)V`; `x`, `p` or `_` between its digits is a decimal point; units as under `units`."""
+    preamble: Searched | None = None
+    """Regular expression searched in the lines above the header, its groups as those of `pattern`, e.g.
+    `Current: (?P<current>-?[0-9.,]+)`; `^` begins a line."""
     setting: str | None = None
     """Which setting of the damper these files measured."""
     fixture: Fixture | None = None
@@ -199,7 +210,7 @@ class FilesEntry(Frozen):
     source: str | None = None
     """Where the files can be had: shown when they are absent."""
 
-    @field_validator("pattern")
+    @field_validator("pattern", "preamble")
     @classmethod
     def _compiles(cls, pattern: str | None) -> str | None:
         if pattern is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from written_files import FORCE, TIME, X, lines, write
+from written_files import FORCE, TIME, X, lines, write, wrong
 
 from pzd.artefacts import Rig
 from pzd.config import load
@@ -224,6 +224,83 @@ def test_names_of_files_tell_the_control_and_the_work_the_sign(tmp_path: Path) -
     rig = read_back(tmp_path, files)
     assert sorted(entry.voltage_V or 0.0 for entry in rig.entries) == [0.0, 75.0, 150.0]
     assert np.abs(rig.records[0].force - FORCE).max() < 1e-5
+
+
+def recorded_below(folder: Path, above: dict[str, list[str]], marks: str = ";.") -> list[Path]:
+    """Store a recording a name below lines of its own, by separator and decimal mark."""
+    separator, decimal = marks
+    columns = [numbers(values, decimal) for values in (TIME, MM, FORCE)]
+    heads = separator.join(("t [s]", "x [mm]", "F [N]"))
+    return [stored(folder / f"{name}.csv", [*said, heads], columns, separator) for name, said in above.items()]
+
+
+SAID_ABOVE = {
+    ("Current [A]: 0.5", "Current [A]: 1"): (";.", "current", (0.5, 1.0)),
+    ("# Spulenstrom = 500 mA", "# Spulenstrom = 1250 mA"): (";.", "current", (0.5, 1.25)),
+    ("Strom;0,5;A", "Strom;1,0;A"): (";,", "current", (0.5, 1.0)),
+    ("Voltage,75,V", "Voltage,150,V"): (",.", "voltage", (75.0, 150.0)),
+    ("Piezo voltage (V):\t0", "Piezo voltage (V):\t150"): (";.", "voltage", (0.0, 150.0)),
+}
+
+
+@pytest.mark.parametrize("said", SAID_ABOVE)
+def test_a_level_above_the_header_is_read_where_it_differs_from_file_to_file(
+    tmp_path: Path, said: tuple[str, str]
+) -> None:
+    """Without it, tests of several levels are fitted as of one. A supply that is the same in all is no level."""
+    marks, name, levels = SAID_ABOVE[said]
+    same = "Supply current [A]: 3" if name == "current" else "Supply voltage [V]: 24"
+    above = {
+        one: ["Bench 4", same, line, f"Oil temperature: {20 + n} degC", ""]
+        for n, (one, line) in enumerate(zip("ab", said, strict=True))
+    }
+    rig = read_back(tmp_path, recorded_below(tmp_path, above, marks))
+    assert [entry.voltage_V for entry in rig.entries] == pytest.approx(levels)
+    assert [entry.temperature_degC for entry in rig.entries] == pytest.approx([20.0, 21.0])
+
+
+def test_what_is_the_same_above_every_header_is_no_level(tmp_path: Path) -> None:
+    above = {one: ["Excitation voltage: 10 V", "Range: 5 kN"] for one in "ab"}
+    assert not any(
+        "preamble" in line or line.startswith("control:") for line in guessed(recorded_below(tmp_path, above))
+    )
+
+
+@pytest.mark.parametrize(
+    ("above", "fault"),
+    [
+        (["Valve: 0.5 A", "Limit: 3 A"], "match it in 2 places (0.5, 3)"),
+        (["Valve: off"], "do not match it"),
+    ],
+)
+def test_lines_above_the_header_that_tell_two_levels_or_none_are_refused(
+    tmp_path: Path, above: list[str], fault: str
+) -> None:
+    recorded_below(tmp_path, {"a": above})
+    entry = {
+        "path": "a.csv",
+        "separator": ";",
+        "skip": len(above),
+        "preamble": "(?P<current>[0-9.]+) A",
+        "units": {"current": "A"},
+    }
+    columns = {"columns": {"time": "t [s]", "displacement": "x [mm]", "force": "F [N]"}}
+    (said,) = wrong(tmp_path, entry | columns, control=Control("current", "A"))
+    assert said == f"rig.files.0.preamble: the lines above the header {fault} (got a.csv)"
+
+
+def test_each_sheet_of_a_workbook_has_the_level_above_its_own_header(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for level in (0.5, 1.0):
+        sheet = book.create_sheet(f"run {level}")
+        sheet.append(["Current [A]:", level])
+        sheet.append(["t [s]", "x [mm]", "F [N]"])
+        for row in zip(TIME.tolist(), MM.tolist(), FORCE.tolist(), strict=True):
+            sheet.append(row)
+    book.save(tmp_path / "book.xlsx")
+    assert [entry.voltage_V for entry in read_back(tmp_path, [tmp_path / "book.xlsx"]).entries] == [0.5, 1.0]
 
 
 # ---------------------------------------------------------------- dampers with clickers

@@ -62,7 +62,7 @@ def test_a_number_in_a_name_that_may_be_two_is_asked_for_and_either_answer_is_re
     assert f"is 0{mark}5A in the names 0.5 A" in asked
     assert "control: {name: current, unit: A}" in text
     (tmp_path / "guess.yaml").write_text("\n".join(text), encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"pattern: must have at least 1 character"):
+    with pytest.raises(ConfigError, match=r"pattern: is empty; fill in one of the answers beside it"):
         load(tmp_path / "guess.yaml")
     for answer, levels in zip(re.findall(r"'(\(\?P[^']+)'", asked), ({0.0, 0.5}, {0.0, 5.0}), strict=True):
         said = "\n".join(text).replace("pattern: ''", f"pattern: '{answer}'")

@@ -454,7 +454,9 @@ def _given_under(layout: Layout, spec: ChannelSpec) -> str:
     entry, names = layout.entry, {spec.own.name, spec.quantity.name}
     if names & set(entry.constants):
         return "constants"
-    return "split.constants" if entry.split and names & set(entry.split.constants) else "pattern"
+    if entry.split and names & set(entry.split.constants):
+        return "split.constants"
+    return "preamble" if entry.preamble and names & {*re.compile(entry.preamble).groupindex} else "pattern"
 
 
 def _starts(sheet: Sheet, split: FileSplit | None, time: Array, place: str) -> list[int]:

@@ -23,7 +23,7 @@ from pzd.quantities import (
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import BLANKS, after_lines
-from pzd.rig.files.formats import TEXT, read_sheet
+from pzd.rig.files.formats import TEXT, lines_above, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
 from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
@@ -39,6 +39,7 @@ from pzd.rig.files.sniffing import (
     is_canonical,
     one_pattern,
     quantity_of,
+    said_above,
     setting_in_names,
     setting_of,
     unit_of,
@@ -180,15 +181,20 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
         levels = _levels_of_folders([file.path for file in group], control)
+        above = [text for file in group for text in _above(file)]
         for path, members in _patterns([file.path for file in group]):
             mine = [file for file in group if file.path in members]
             d = mine[0].dialect
             columns = dict(mine[0].columns) if d.headless else _told(d, control)
             pattern, units = _from_names(mine, columns, control)
+            unknown = [q for q in (VOLTAGE, TEMPERATURE) if not {q, own_quantity(q, control).name} & {*columns, *units}]
+            preamble, said = said_above(above, unknown, control)
             lines = [f"    - path: {written(path)}"]
             lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
-            lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units)]
-            controlled = VOLTAGE in columns or control.name in units
+            lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units | said)]
+            if preamble:
+                lines.append(f"      preamble: {written(preamble)}    # in the lines above the header")
+            controlled = VOLTAGE in columns or control.name in units | said
             if not controlled and (level := levels.get(mine[0].path.parent)):
                 lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
                 controlled = True
@@ -311,10 +317,7 @@ _RECORDER = ("V", "mV", "Volt", "Volts", "count", "counts", "bit", "digit", "-",
 
 def _rate(file: SniffedFile) -> float | None:
     """Return the sampling rate [Hz] in the lines above the header of a text file, None without one."""
-    if file.form != TEXT:
-        return None
-    text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace")
-    found = _RATE.search(text[: after_lines(text, file.dialect.skip)])
+    found = next(filter(None, map(_RATE.search, _above(file))), None) if file.form == TEXT else None
     return float(found[1].replace(",", ".")) * (1e3 if found[2] else 1.0) if found else None
 
 
@@ -553,9 +556,23 @@ def _control(files: Sequence[SniffedFile]) -> Control:
     signals = [control_of(file.dialect.header, file.dialect.units) for file in files]
     control = next((signal for signal in signals if signal != Control()), Control())
     controlled = any(VOLTAGE in dict(file.columns) for file in files)
-    if control == Control() and not controlled and _current_in_names([file.path for file in files]):
-        return Control("current", "A")
+    amperes = Control("current", "A")
+    if control == Control() and not controlled:
+        above = [text for file in files for text in _above(file)]
+        if _current_in_names([file.path for file in files]) or said_above(above, [VOLTAGE], amperes)[1]:
+            return amperes
     return control
+
+
+def _above(file: SniffedFile) -> tuple[str, ...]:
+    """Return the lines above the header of every table of a file of text or loose cells."""
+    if not file.dialect.skip:
+        return ()
+    if file.form == TEXT:
+        text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace").replace("\r\n", "\n")
+        return (text[: after_lines(text, file.dialect.skip)],)
+    sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset(file.dialect.header)), "rig.files")
+    return lines_above(file.path, _as_sniffed(file), sheet, "rig.files")
 
 
 def _current_in_names(paths: Sequence[Path]) -> bool:

@@ -109,10 +109,44 @@ class Layout:
                 faults += self._misfit(path.stem if re.search(entry.pattern, path.stem) else path.name, path)
                 groups = match.groupdict()
                 setting = groups.pop("setting", None) or setting
-                values |= self._from_name(groups, path, faults)
+                values |= self._from_groups(groups, "pattern", path, faults)
         if faults:
             raise ConfigError(faults)
         return values, setting
+
+    def values_above(self, texts: Sequence[str], path: Path) -> tuple[Values, str | None]:
+        """Return the values in the lines above the header of each table of a file, and the setting there.
+
+        Parameters
+        ----------
+        texts : the lines above the header of each table that was read
+        path : the file
+
+        Raises
+        ------
+        ConfigError : when the lines do not match the preamble, or in several places
+        """
+        faults: list[str] = []
+        of_tables: list[Values] = []
+        settings: list[str | None] = []
+        for text in texts:
+            found = list(re.finditer(self.entry.preamble or "", text, re.MULTILINE))
+            told = list(dict.fromkeys(" and ".join(filter(None, match.groups())) for match in found))
+            if len(told) != 1:
+                where = f"match it in {len(told)} places ({', '.join(told)})" if told else "do not match it"
+                faults.append(f"{self.place}.preamble: the lines above the header {where} (got {path.name})")
+                continue
+            groups = found[0].groupdict()
+            settings.append(groups.pop("setting", None))
+            of_tables.append(self._from_groups(groups, "preamble", path, faults))
+        if len({*settings}) > 1:
+            faults.append(
+                f"{self.place}.preamble: a file is of one setting (got {', '.join(map(str, settings))} in {path.name})"
+            )
+        if faults:
+            raise ConfigError(list(dict.fromkeys(faults)))
+        quantities = list(dict.fromkeys(quantity for values in of_tables for quantity in values))
+        return {q: tuple(number for values in of_tables for number in values[q]) for q in quantities}, settings[0]
 
     def _labels(self) -> list[ChannelSpec]:
         return [spec for spec in self.channels if spec.quantity in LABELS]
@@ -142,19 +176,19 @@ class Layout:
                 )
         return faults
 
-    def _from_name(self, groups: dict[str, str | None], path: Path, faults: list[str]) -> Values:
+    def _from_groups(self, groups: dict[str, str | None], key: str, path: Path, faults: list[str]) -> Values:
+        """Return the values that the groups of `pattern` or `preamble` found."""
         values: Values = {}
         for spec in self._labels():
             text, own = _lookup(groups, spec.own, spec.quantity), spec.own
             if text is None:
                 continue
             if spec.unit is None:
-                faults.append(
-                    f"{self.place}.units: {own.name}: the file's name has no unit; say {own.name}: {own.unit}"
-                )
+                what = "the file's name has" if key == "pattern" else "the lines above the header have"
+                faults.append(f"{self.place}.units: {own.name}: {what} no unit; say {own.name}: {own.unit}")
                 continue
             number = number_in_name(text)
-            at_place = f"{self.place}.pattern: {path.name}"
+            at_place = f"{self.place}.{key}: {path.name}"
             values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
         return values
 
@@ -234,15 +268,16 @@ def _faults(layout: Layout) -> list[str]:
     for field, allowed in (("columns", CHANNELS), ("units", CHANNELS), ("sign", CHANNELS), ("constants", LABELS)):
         given: Mapping[str, object] = getattr(entry, field)
         faults += _wrong(f"{place}.{field}", given, allowed, control)
-    groups = re.compile(entry.pattern).groupindex if entry.pattern else {}
-    faults += _wrong(f"{place}.pattern", [g for g in groups if g != "setting"], LABELS, control)
+    by_text = {key: re.compile(getattr(entry, key) or "").groupindex for key in ("pattern", "preamble")}
+    for key, groups in by_text.items():
+        faults += _wrong(f"{place}.{key}", [g for g in groups if g != "setting"], LABELS, control)
     a_test = entry.split.constants if entry.split else {}
     faults += _wrong(f"{place}.split.constants", a_test, LABELS, control)
     given_by: dict[str, Iterable[str]] = {
         "columns": entry.columns,
         "constants": entry.constants,
         "split.constants": a_test,
-        "pattern": groups,
+        **by_text,
     }
     for spec in layout.channels:
         ways = [field for field, keys in given_by.items() if spec.own.name in keys or spec.quantity.name in keys]
@@ -252,8 +287,10 @@ def _faults(layout: Layout) -> list[str]:
     if entry.rate_Hz is not None and entry.columns.get(TIME.name, " "):
         twice = [field for field in ("columns", "units", "sign") if TIME.name in getattr(entry, field)]
         faults += [f"{place}: time: said twice, under rate_Hz and {field}" for field in twice]
-    if "setting" in groups and entry.setting is not None:
-        faults.append(f"{place}: setting: said twice, under setting and pattern")
+    named = ["setting"] if entry.setting is not None else []
+    named += [key for key, groups in by_text.items() if "setting" in groups]
+    if len(named) > 1:
+        faults.append(f"{place}: setting: said twice, under {' and '.join(named)}")
     return faults
 
 

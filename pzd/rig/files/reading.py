@@ -35,7 +35,7 @@ from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_
 from pzd.rig.files.child import end_child
 from pzd.rig.files.clock import clock_remarks
 from pzd.rig.files.counted import beside_counted
-from pzd.rig.files.formats import read_sheet
+from pzd.rig.files.formats import lines_above, read_sheet
 from pzd.rig.files.layout import Layout, Values, layouts
 from pzd.rig.files.refusals import refuse, sign_faults, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep, Sheet
@@ -420,6 +420,9 @@ def _read_file(path: Path, layout: Layout, folder: Path) -> tuple[Layout, list[t
 
         placed = beside.model_copy(update={"path": str(folder / beside.path)})
         sheet, layout = with_other_logger(path, layout, placed)
+    if layout.entry.preamble is not None:
+        more, named = layout.values_above(lines_above(path, layout.entry, sheet, layout.place), path)
+        values, setting = values | more, named or setting
     return layout, _tests_of(sheet, layout, values, setting)
 
 

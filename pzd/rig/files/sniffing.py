@@ -246,6 +246,56 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
     return f"{number}{blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
 
 
+_SAID = re.compile(
+    r"""[^\w\n]*(?P<label>[^\d\W][^:=;,\t\n]*?)[\s."']*[:=;,\t][^\w\n+-]*
+    (?P<number>[-+]?\d+(?:[.,]\d+)?)[^\w\n%\u00b0]*(?P<unit>[A-Za-z%\u00b0\u00b5]{1,5})?\W*""",
+    re.VERBOSE,
+)
+"""A line above a header: `Current [A]: 0.5`, `# Strom; 0,5; A`."""
+
+
+def said_above(texts: Sequence[str], quantities: Sequence[Quantity], control: Control) -> tuple[str, dict[str, str]]:
+    r"""Return the pattern that finds labels of the tests in the lines above each table, and the unit of each label.
+
+    What is the same above all of them may be the supply of the valve or a limit of the stand.
+
+    Parameters
+    ----------
+    texts : lines above each table
+    quantities : labels to look for: `VOLTAGE` for the control signal, the temperature
+    control : the control signal
+
+    Returns
+    -------
+    an empty pattern where no label is said above every table
+
+    Examples
+    --------
+    >>> above = ["Valve\nCurrent [A]: 0.5", "Valve\nCurrent [A]: 1.0"]
+    >>> said_above(above, [VOLTAGE], Control("current", "A"))[1]
+    {'current': 'A'}
+    """
+    lines = [[match for line in text.split("\n") if (match := _SAID.fullmatch(line))] for text in texts]
+    found: dict[str, tuple[int, str, str]] = {}
+    for place, first in enumerate(lines[0] if lines else []):
+        label = first["label"].strip()
+        same = [match for of_text in lines for match in of_text if match["label"].strip() == label]
+        for quantity in quantities:
+            name = own_quantity(quantity, control).name
+            units = {unit_of(label, match["unit"], own_quantity(quantity, control)) for match in same}
+            meant = quantity_of(label, first["unit"], control) is quantity and name not in found
+            differ = len(same) == len(texts) and len({match["number"] for match in same}) > 1
+            if meant and differ and len(units) == 1 and (unit := units.pop()) is not None:
+                number = rf"^\W*{_as_pattern(label)}[^\w\n-]*(?P<{name}>-?[0-9]+(?:[.,][0-9]+)?)"
+                found[name] = place, number, unit
+    patterns = [pattern for _, pattern, _ in sorted(found.values())]
+    return r"[\s\S]*?".join(patterns), {name: unit for name, (_, _, unit) in found.items()}
+
+
+def _as_pattern(text: str) -> str:
+    return re.escape(text).replace("\\ ", " ")
+
+
 _DECIMALS_OF_IT = re.compile(r"(?<!\d)\d{1,2}[_-]$")
 
 

@@ -170,7 +170,7 @@ def _another_level(entry: RecordEntry, entries: tuple[RecordEntry, ...]) -> Iter
             size=ratio,
             unit="-",
             follows="one fit to both is neither: if a control signal, a setting or a temperature differed, say which, "
-            "by columns, constants, pattern or setting",
+            "by columns, constants, pattern, preamble or setting",
         )
 
 

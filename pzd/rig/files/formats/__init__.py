@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from pzd.rig.files.child import as_plain, read_in_child
+from pzd.rig.files.dialect import after_lines, text_of
 from pzd.rig.files.one_clock import on_one_clock
 from pzd.rig.files.sheet import FileTable, Sheet, Wanted, named_tables, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
@@ -125,6 +126,31 @@ def rows_in(path: Path, module: ModuleType) -> dict[str, list[list[str]]] | None
         return None
     found: dict[str, list[list[str]]] = read_in_child(path, module, "rows")
     return found
+
+
+def lines_above(path: Path, entry: FilesEntry, sheet: Sheet, place: str) -> tuple[str, ...]:
+    """Return the lines above the header of every table of a file that was read, one text each.
+
+    Parameters
+    ----------
+    path : the file
+    entry : how it was read
+    sheet : what was read of it
+    place : where the entry stands in the config
+
+    Raises
+    ------
+    ConfigError : when nothing stands above the headers in files of this format
+    """
+    module = formats()[form := format_of(path, entry.format, place)]
+    if form == TEXT:
+        text = text_of(path, entry.encoding)
+        return (text[: after_lines(text, entry.skip if sheet.header_line is None else sheet.header_line - 1)],)
+    rows = rows_in(path, module)
+    if rows is None:
+        raise ConfigError(f"{place}.preamble: {module.KIND} has nothing of the kind ({at(path)})")
+    above = (rows[table][: entry.skip] for table in sheet.tables)
+    return tuple("\n".join("\t".join(filter(None, cells)) for cells in table) for table in above)
 
 
 def by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
