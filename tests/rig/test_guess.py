@@ -303,6 +303,13 @@ def test_each_sheet_of_a_workbook_has_the_level_above_its_own_header(tmp_path: P
     assert [entry.voltage_V for entry in read_back(tmp_path, [tmp_path / "book.xlsx"]).entries] == [0.5, 1.0]
 
 
+def test_the_share_of_time_of_a_valve_is_its_level_and_not_the_voltage_that_it_chops(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 12.0, 0 * X + 40.0)]
+    path = stored(tmp_path / "a.csv", ["t [s],x [mm],F [N],Supply voltage [V],PWM [%]"], columns, ",")
+    rig = read_back(tmp_path, [path])
+    assert rig.entries[0].voltage_V == pytest.approx(40.0)
+
+
 # ---------------------------------------------------------------- dampers with clickers
 
 CLICKERS = {

@@ -52,6 +52,26 @@ def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, n
     assert (entry.voltage_V if quantity == "voltage" else entry.temperature_degC) == value
 
 
+@pytest.mark.parametrize(
+    ("names", "levels"),
+    [
+        (("r_500mA", "r_1A"), (0.5, 1.0)),
+        (("r_0.5Amp", "r_2 Amps"), (0.5, 2.0)),
+        (("r_0x1kV", "r_150V"), (100.0, 150.0)),
+        (("r_40%", "r_80pct"), (40.0, 80.0)),
+    ],
+)
+def test_levels_whose_units_differ_from_name_to_name_are_read_each_by_its_own(
+    tmp_path: Path, names: tuple[str, str], levels: tuple[float, float]
+) -> None:
+    for name in names:
+        write(tmp_path / f"{name}.csv", lines(PLAIN))
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed(sorted(tmp_path.glob("*.csv")))), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    found = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert {entry.voltage_V for entry in found} == {*levels}
+
+
 @pytest.mark.parametrize("mark", "_-")
 def test_a_number_in_a_name_that_may_be_two_is_asked_for_and_either_answer_is_read(tmp_path: Path, mark: str) -> None:
     """Is r_0_5A half an ampere, or the first run at five? By either reading levels may be merged or exchanged."""

@@ -208,7 +208,7 @@ def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, st
     if found is None:
         return {}
     values = ((folder, re.search(found[0], folder.name)) for folder in folders)
-    return {folder: f"{number_in_name(match[1])} {found[1]}" for folder, match in values if match}
+    return {folder: f"{number_in_name(match[1])} {found[1]}".strip() for folder, match in values if match}
 
 
 def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:
@@ -251,7 +251,7 @@ def _keys(
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         yield from _asked_columns(files[0], columns, missing, several)
-    units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
+    units = [*_units(named, dialect), *(f"  {name}: {written(unit)}" for name, unit in in_names.items() if unit)]
     doubt = None if pattern or VOLTAGE in columns else doubt_in_names([file.path.stem for file in files])
     units += [f"  {doubt[0]}: {doubt[1]}"] if doubt else []
     units += list(_asked_units(files[0], columns, [q for q in missing if q not in several]))
@@ -500,7 +500,7 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     if not any(entry.controlled for entry in entries):
         lines += [*_maybe_control(found), *_WITHOUT_CAR]
     if control != Control():
-        lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
+        lines.append(f"control: {{name: {control.name}, unit: {written(control.unit)}}}")
     settings = {setting for entry in entries for setting in entry.settings}
     names = sorted(setting for setting in settings if setting is not None)
     if len(settings) > 1:
@@ -546,7 +546,7 @@ def _maybe_control(files: Sequence[SniffedFile]) -> list[str]:
         + (
             "."
             if control == Control()
-            else f", and at the top control: {{name: {control.name}, unit: {control.unit}}}."
+            else f", and at the top control: {{name: {control.name}, unit: {written(control.unit)}}}."
         )
         for head, control in left.items()
     ]
@@ -556,12 +556,12 @@ def _control(files: Sequence[SniffedFile]) -> Control:
     signals = [control_of(file.dialect.header, file.dialect.units) for file in files]
     control = next((signal for signal in signals if signal != Control()), Control())
     controlled = any(VOLTAGE in dict(file.columns) for file in files)
-    amperes = Control("current", "A")
-    if control == Control() and not controlled:
-        above = [text for file in files for text in _above(file)]
-        if _current_in_names([file.path for file in files]) or said_above(above, [VOLTAGE], amperes)[1]:
-            return amperes
-    return control
+    if control != Control() or controlled:
+        return control
+    above = [text for file in files for text in _above(file)]
+    others = (other for other in CONTROLS if other != Control())
+    told = (each for each in others if _in_names(each, files) or said_above(above, [VOLTAGE], each)[1])
+    return next(told, control)
 
 
 def _above(file: SniffedFile) -> tuple[str, ...]:
@@ -575,12 +575,13 @@ def _above(file: SniffedFile) -> tuple[str, ...]:
     return lines_above(file.path, _as_sniffed(file), sheet, "rig.files")
 
 
-def _current_in_names(paths: Sequence[Path]) -> bool:
-    """Whether a current stands in the name of every file, or of its folder."""
-    stems, amperes = [path.stem for path in paths], Control("current", "A")
+def _in_names(control: Control, files: Sequence[SniffedFile]) -> bool:
+    """Whether a control signal stands in the name of every file, or of its folder."""
+    paths = [file.path for file in files]
+    stems = [path.stem for path in paths]
     doubt = doubt_in_names(stems)
-    named = value_in_names(stems, amperes.name) is not None or (doubt is not None and doubt[0] == amperes.name)
-    return named or bool(_levels_of_folders(paths, amperes))
+    named = value_in_names(stems, control.name) is not None or (doubt is not None and doubt[0] == control.name)
+    return named or bool(_levels_of_folders(paths, control))
 
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:

@@ -29,6 +29,8 @@ LABELS = (VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities that a constant or the name of the file may give."""
 _BEFORE_MINUS = re.compile(r"(?:^|[^A-Za-z0-9])(?:T|temp|temperature?|U|V|volt|voltage|I|current)?$", re.IGNORECASE)
 """What stands before a minus; after any other word a dash joins."""
+_NAMES_UNIT = re.compile(r"\d\s*[A-Za-z%\u00b0\u00b5]+$")
+"""A number with its unit, which goes before that of the config: 500mA."""
 ALSO_READ = {TEMPERATURE: "temperature_C"}
 """Second headers that are read without being named."""
 
@@ -183,13 +185,13 @@ class Layout:
             text, own = _lookup(groups, spec.own, spec.quantity), spec.own
             if text is None:
                 continue
-            if spec.unit is None:
+            number, unit = number_in_name(text), "" if _NAMES_UNIT.search(text) else spec.unit
+            if unit is None:
                 what = "the file's name has" if key == "pattern" else "the lines above the header have"
                 faults.append(f"{self.place}.units: {own.name}: {what} no unit; say {own.name}: {own.unit}")
                 continue
-            number = number_in_name(text)
             at_place = f"{self.place}.{key}: {path.name}"
-            values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
+            values[spec.quantity] = (_constant(f"{number} {unit}".rstrip(), spec, at_place, faults),)
         return values
 
 

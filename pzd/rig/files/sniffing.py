@@ -61,13 +61,14 @@ _LOOKS_LIKE = {
 }
 """Headers of each quantity, without a unit in brackets."""
 CONTROLS = {
+    Control("pwm", "%"): r"\bpwm|\bduty|tastverh|tastgrad",
     Control(): r"^u$|volt|spannung|tension|tensi[oó]n|napi[eę]ci|tens[aã]o|\u7535\u538b|\u96fb\u5727"
     r"|\u043d\u0430\u043f\u0440\u044f\u0436\u0435\u043d\u0438",
     Control(
         "current", "A"
     ): r"^i$|current|strom|courant|corriente|corrente|^pr[aą]d|\u7535\u6d41|\u96fb\u6d41|^\u0442\u043e\u043a",
 }
-"""Headers of the control signal."""
+"""Headers of the control signal; a share of time goes before the voltage that it chops."""
 REBOUND, COMPRESSION = "rebound", "compression"
 """Columns of force by direction, as the keys of a curve's `columns`."""
 DIRECTIONS = {
@@ -86,6 +87,7 @@ _WITH_UNIT = {
 }
 """Symbols of a quantity where a unit of it follows: `x_m`, `F_kN`, `T [degC]`."""
 _CONTROLS_WITH_UNIT = {
+    Control("pwm", "%"): "ctrl|control|valve|coil",
     Control(): "^u$|ctrl|control|valve|piezo|coil",
     Control("current", "A"): "^i$|ctrl|control|valve|coil",
 }
@@ -214,15 +216,18 @@ _NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.xp,][0-9]+)?)"
 _VALUES = {
     "voltage": re.compile(rf"{_NUMBER} ?(mV|kV|V|Volts?)(?![A-Za-z])"),
     "current": re.compile(rf"{_NUMBER} ?(mA|A|Amps?)(?![A-Za-z])"),
+    "pwm": re.compile(rf"{_NUMBER} ?(%|pct|percent)(?![A-Za-z])"),
     "temperature": re.compile(rf"{_NUMBER}(degC|C)(?![A-Za-z])"),
 }
-"""150V, 0x5A, 0p5A, 0.5 Amp, 22degC."""
+"""150V, 0x5A, 0p5A, 0.5 Amp, 40pct, 22degC."""
 _CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
 """C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
 
 
 def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
-    """Return the pattern that finds a quantity in every name, and its unit; None where a name lacks it or units differ.
+    """Return the pattern that finds a quantity in every name, and its unit; None where a name lacks it.
+
+    Where the units differ (500mA, 1A) they are in the group of the pattern, and the unit returned is empty.
 
     Parameters
     ----------
@@ -230,10 +235,9 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
     name : `voltage`, `current` or `temperature`
     """
     matches = [_VALUES[name].search(stem) if name in _VALUES else None for stem in stems]
-    units = {match[2] for match in matches if match}
-    if not all(matches) or len(units) != 1:
+    units = sorted({match[2] for match in matches if match})
+    if not all(matches) or (name == "temperature" and len(units) > 1):
         return None
-    (unit,) = units
     found = [(stem, match) for stem, match in zip(stems, matches, strict=True) if match]
     if name != "temperature" and any(_two_numbers(stem, match) for stem, match in found):
         return None
@@ -242,8 +246,11 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
         return None  # a dash in one name and a minus in another
     comma = "," if any("," in match[1] for _, match in found) else ""
     blank = " ?" * any(match.end(1) < match.start(2) for _, match in found)
-    number = f"(?P<{name}>{'-?' * (True in minus)}[0-9.{comma}xp]+)"
-    return f"{number}{blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+    number = f"{'-?' * (True in minus)}[0-9.{comma}xp]+"
+    if len(units) > 1:
+        return f"(?P<{name}>{number}{blank}(?:{'|'.join(units)}))(?![A-Za-z])", ""
+    unit = units[0]
+    return f"(?P<{name}>{number}){blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
 
 
 _SAID = re.compile(

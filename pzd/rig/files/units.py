@@ -30,6 +30,7 @@ _ABOUT = re.compile(
 """A unit, and the reading of the recorder that means zero."""
 _IN_BRACKETS = re.compile(r"[\[(\uff08\u3010]\s*([^\[\]()\uff08\uff09\u3010\u3011]+?)\s*[\])\uff09\u3011]\s*$")
 SPELLINGS = {
+    "pct": "%",
     "Sec": "s",
     "sec": "s",
     **dict.fromkeys(("Volts", "Volt"), "V"),
