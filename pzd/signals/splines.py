@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.signals.measures import found_once
@@ -75,15 +77,32 @@ def even_cubic(values: Array, *, periodic: bool = False) -> Callable[[Array], Ar
     def at(position: Array) -> Array:
         inside = np.mod(position, count) if periodic else position
         first = np.floor(inside) if periodic else np.clip(np.floor(inside), 0, count - 2)
-        share = np.expand_dims(inside - first, tuple(range(first.ndim, first.ndim + values.ndim - 1)))
-        rest, k = 1.0 - share, first.astype(np.intp)
-        found = rest**3 * c[k]
-        found += (4.0 - 3.0 * share**2 * (1.0 + rest)) * c[k + 1]
-        found += (4.0 - 3.0 * rest**2 * (1.0 + share)) * c[k + 2]
-        found += share**3 * c[k + 3]
-        return np.asarray(found / 6.0)
+        of_each = c.reshape(len(c), -1)
+        found = np.empty((np.size(first), of_each.shape[1]))
+        _compiled_between()(of_each, first.astype(np.intp).ravel(), np.asarray(inside - first).ravel(), found)
+        return found.reshape(*np.shape(inside), *values.shape[1:])
 
     return at
+
+
+@cache
+def _compiled_between() -> Callable[[Array, NDArray[np.intp], Array, Array], None]:
+    """Return `_between` compiled: numba is imported for the first value, and not to see that a run is fresh."""
+    from pzd.compiled import compiled
+
+    return compiled(_between)
+
+
+def _between(c: Array, first: NDArray[np.intp], share: Array, values: Array) -> None:
+    """Fill values (m, p) of the cubics with coefficients c (n, p) at a share (m,) of the step behind a sample (m,)."""
+    for i in range(first.size):
+        k, u = first[i], share[i]
+        rest = 1.0 - u
+        here, then = 4.0 - 3.0 * u * u * (1.0 + rest), 4.0 - 3.0 * rest * rest * (1.0 + u)
+        before, behind = rest * rest * rest, u * u * u
+        for j in range(values.shape[1]):
+            cubic = before * c[k, j] + here * c[k + 1, j] + then * c[k + 2, j] + behind * c[k + 3, j]
+            values[i, j] = cubic / 6.0
 
 
 def integral(time: Array, values: Array) -> Callable[[Array], Array]:
