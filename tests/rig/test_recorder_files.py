@@ -381,7 +381,7 @@ def test_a_file_that_no_format_reads_is_told_by_its_kind(start: bytes, kind: str
 
 @pytest.mark.parametrize(
     ("minus", "mark", "decimal"),
-    [("\u2212", "", "."), ("-", "'", ","), ("-", "\u2019", "."), ("\u2212", "\u202f", ",")],
+    [("\u2212", "", "."), ("-", "'", ","), ("-", "\u2019", "."), ("\u2212", "\u202f", ","), ("-", ".", ",")],
 )
 def test_a_typographic_minus_and_marks_between_thousands_are_no_part_of_a_number(
     tmp_path: Path, minus: str, mark: str, decimal: str
@@ -405,7 +405,7 @@ def test_extremes_and_a_remark_below_the_table_are_left_out_and_told(tmp_path: P
         ("Time [s]", "Stroke [mm]", "Force [N]"),
         (("Max", 15, 300.5), ("Min", -15, -300.5), ("-- Warm oil --",)),
     )
-    path = tmp_path / f"a.{ending}"
+    path, told = tmp_path / f"a.{ending}", 3 if ending == "csv" else 4  # a sheet counts the empty row above them
     if ending == "csv":
         text = [",".join(head), *table(TIME, MM, FORCE), "", *(",".join(map(str, row)) for row in below)]
         path.write_text("\n".join(text) + ",,\n", encoding="utf-8")
@@ -419,7 +419,7 @@ def test_extremes_and_a_remark_below_the_table_are_left_out_and_told(tmp_path: P
     config = load(tmp_path / "guess.yaml")
     rig = ingest(config.rig, config.control.signal(), tmp_path)
     assert rig.records[0].time.size == SAMPLES
-    assert any("4 lines of words below the table" in row.was for row in rig.ingested), rig.ingested
+    assert any(f"{told} lines of words below the table" in row.was for row in rig.ingested), rig.ingested
 
 
 def test_units_in_capitals_are_read_as_they_are_meant(tmp_path: Path) -> None:
@@ -474,3 +474,54 @@ def test_an_index_of_instants_without_a_name_is_the_clock_of_a_parquet(tmp_path:
     config = load(tmp_path / "guess.yaml")
     (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
     assert record.time == pytest.approx(TIME, abs=1e-9)
+
+
+def read_as_guessed(path: Path) -> Sequence[Any]:
+    """Return the records of a file, read as init proposes."""
+    (path.parent / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")
+    config = load(path.parent / "guess.yaml")
+    return ingest(config.rig, config.control.signal(), path.parent).records
+
+
+@pytest.mark.parametrize("decimal", ".,")
+def test_numbers_that_a_workbook_holds_as_text_are_read_with_its_decimal_mark(tmp_path: Path, decimal: str) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Time [s]", "Stroke [mm]", "Force [N]"])
+    for row in zip(TIME, MM, FORCE, strict=True):
+        book.active.append([f"{value:.6f}".replace(".", decimal) for value in row])
+    book.save(tmp_path / "a.xlsx")
+    (record,) = read_as_guessed(tmp_path / "a.xlsx")
+    assert record.displacement == pytest.approx(X, abs=1e-9)
+    assert record.force == pytest.approx(FORCE, abs=1e-5)
+
+
+@pytest.mark.parametrize("below", ["", "channels"])
+@pytest.mark.parametrize("samples", ["data", "values", "samples"])
+def test_a_list_of_channels_with_their_names_and_units_is_one_table(tmp_path: Path, below: str, samples: str) -> None:
+    channels = [
+        {"name": name, "unit": unit, samples: values.tolist()}
+        for name, unit, values in (("Time", "s", TIME), ("Stroke", "mm", MM), ("Load", "N", FORCE))
+    ]
+    (tmp_path / "a.json").write_text(json.dumps({below: channels} if below else channels), encoding="utf-8")
+    (record,) = read_as_guessed(tmp_path / "a.json")
+    assert record.displacement == pytest.approx(X)
+    assert record.force == pytest.approx(FORCE)
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_empty_lines_between_rows_are_left_out_where_a_clock_goes_on(tmp_path: Path, quote: str) -> None:
+    rows = [*table(TIME, MM, FORCE)]
+    head = f"Time [s],Stroke [mm],{quote}Force [N]{quote}"
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows[:400], "", " ", *rows[400:]]) + "\n", encoding="utf-8")
+    (record,) = read_as_guessed(tmp_path / "a.csv")
+    assert record.force == pytest.approx(FORCE)
+
+
+def test_an_empty_line_between_rows_without_a_clock_is_refused(tmp_path: Path) -> None:
+    """Another recording may begin behind it, and nothing would tell."""
+    rows = [*table(MM, FORCE)]
+    text = ["Rate: 500 Hz", "Stroke [mm],Force [N]", *rows[:400], "", *rows[400:]]
+    (tmp_path / "a.csv").write_text("\n".join(text) + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"a\.csv:403: 1 fields where the header has 2"):
+        read_as_guessed(tmp_path / "a.csv")

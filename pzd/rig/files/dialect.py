@@ -82,18 +82,24 @@ def text_bytes(path: Path) -> bytes:
     return raw
 
 
+_POINT_OF_THOUSANDS = re.compile(r"(?<=\d)\.(?=\d{3}(?:\.\d{3})*,\d)")
+"""A point before three digits and a comma, where that is the decimal one."""
 _BETWEEN_THOUSANDS = re.compile(r"(?<=\d)['\u2019\u00a0\u202f](?=\d{3})")
 """Marks that stand between digits for nothing but thousands; a comma or a point may be that of a decimal."""
 
 
-def plain_numbers(text: str) -> str:
+def plain_numbers(text: str, decimal: str = ".") -> str:
     """Return text without marks between thousands that mean nothing else, and with every minus as a hyphen.
 
     Examples
     --------
     >>> plain_numbers("\u22121'234,5")
     '-1234,5'
+    >>> plain_numbers("1.234,5", ",")
+    '1234,5'
     """
+    if decimal == ",":
+        text = _POINT_OF_THOUSANDS.sub("", text)
     if "\u2212" in text:
         text = text.replace("\u2212", "-")
     return _BETWEEN_THOUSANDS.sub("", text) if any(mark in text for mark in "'\u2019\u00a0\u202f") else text

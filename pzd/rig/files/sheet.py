@@ -136,8 +136,8 @@ Cells = Array | list[str]
 
 MOST_FAULTS = 5
 """Faults of one kind that are listed for one file or column: enough to see what they have in common."""
-_UNITS, _VALUES = ("unit", "units"), ("values", "value", "data")
-"""Keys under which a structure holds the unit and the samples of one column."""
+_NAMES, _UNITS, _VALUES = ("name", "channel", "label"), ("unit", "units"), ("values", "value", "data", "samples")
+"""Keys under which a structure holds name, unit and samples of one column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,6 +252,8 @@ def tables_of_tree(
         inner, unit = _leaf(value)
         if isinstance(inner, Mapping):
             below.append((key, inner))
+        elif (channels := named_channels(inner)) is not None:
+            below.append((key, channels))
         elif isinstance(inner, list) and inner and all(isinstance(one, Mapping) for one in inner):
             below += [(f"{key}.{n + 1}", one) for n, one in enumerate(inner)]
         elif isinstance(inner, bool | int | float | np.number):
@@ -356,6 +358,28 @@ def tables_by_length(
         called = f"{name} of {length} rows".strip() if len(lengths) > 1 else name
         cells = tuple(cells for cells, _ in every.values())
         found.append(FileTable(called, tuple(every), cells, units if any(units) else None))
+    return found
+
+
+def named_channels(value: Any) -> dict[str, Any] | None:
+    """Return a list of channels, each with its name and samples, as columns by name; None where it is none.
+
+    Examples
+    --------
+    >>> named_channels([{"name": "Load", "unit": "N", "data": [1.0, 2.0]}])
+    {'Load': {'unit': 'N', 'values': [1.0, 2.0]}}
+    """
+    if not isinstance(value, list) or not value or not all(isinstance(one, Mapping) for one in value):
+        return None
+    found: dict[str, Any] = {}
+    for one in value:
+        keys = {key.lower(): key for key in one}
+        name, unit, samples = (
+            next((one[keys[key]] for key in among if key in keys), None) for among in (_NAMES, _UNITS, _VALUES)
+        )
+        if not isinstance(name, str) or name in found or not isinstance(samples, list | np.ndarray):
+            return None
+        found[name] = {"unit": unit, "values": samples} if isinstance(unit, str) else samples
     return found
 
 

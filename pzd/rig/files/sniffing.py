@@ -393,11 +393,11 @@ class Dialect:
         form : name of its format
         split : how it is cut into tests
         """
-        options: dict[str, Any] = {"skip": self.skip, "units_row": self.units_row}
+        options: dict[str, Any] = {"skip": self.skip, "units_row": self.units_row, "decimal": self.decimal}
         if self.headless or self.apart:
             options["header"] = self.header
         if form == TEXT:
-            options |= {"separator": self.separator, "decimal": self.decimal, "encoding": self.encoding}
+            options |= {"separator": self.separator, "encoding": self.encoding}
         return FilesEntry(path=str(path), split=split, **options)
 
 
@@ -505,8 +505,9 @@ def _fields(line: str, separator: str) -> list[str]:
 def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
     """Guess the header and first row among rows of cells, as in the sheet of a workbook."""
     width = max((sum(bool(cell) for cell in row) for row in rows), default=0)
-    found = _table([[cell.strip() for cell in row[:width]] for row in rows[:MOST_LINES]], "utf-8", ",", ".")
-    return found[1] if found else None
+    cells = [[cell.strip() for cell in row[:width]] for row in rows[:MOST_LINES]]
+    found = [table for decimal in ".," if (table := _table(cells, "utf-8", "\t", decimal)) is not None]
+    return max(found, key=lambda rated: rated[0])[1] if found else None
 
 
 _CODE_PAGES = ("latin-1", "cp1250", "cp1251", "gbk", "shift_jis")
@@ -662,6 +663,6 @@ def _unquoted(cell: str) -> str:
 
 def _numbers(row: list[str], decimal: str) -> int:
     """Count the cells of a row that are numbers, or a date or time."""
-    plain = [plain_numbers(cell) for cell in row]
+    plain = [plain_numbers(cell, decimal) for cell in row]
     spelled = [cell.replace(",", ".") if decimal == "," and "." not in cell else cell for cell in plain]
     return sum(bool(_CELL_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)

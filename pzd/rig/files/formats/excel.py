@@ -1,16 +1,18 @@
-"""Excel workbooks: every sheet is a table; `skip`, `header` and `units_row` as for text.
+"""Excel workbooks: every sheet is a table; `decimal`, `skip`, `header` and `units_row` as for text.
 
 Of a formula, the value that Excel last computed is read.
 """
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pzd.rig.files.dialect import plain_numbers
 from pzd.rig.files.sheet import MOST_BELOW, FileTable, cells_of, spelled, told_below, words_below
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")
 NEEDS = "openpyxl"
-OPTIONS = ("skip", "header", "units_row", "table")
+OPTIONS = ("decimal", "skip", "header", "units_row", "table")
 APART = True
 
 
@@ -60,12 +62,22 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | 
     return FileTable(
         name,
         tuple("" if head is None else spelled(head) for head in named[:width]),
-        tuple(cells_of([row[n] for row in body]) for n in range(width)),
+        tuple(cells_of([_with_point(row[n], entry.decimal) for row in body]) for n in range(width)),
         units,
         np.arange(len(body)) + entry.skip + above + 1,
         entry.skip + 1 if entry.header is None else None,
         steps=(told_below(below),) if below else (),
     )
+
+
+_WRITTEN = re.compile(r"[-+\u2212]?\d[\d.]*,\d+(?:[eE][-+]?\d+)?")
+
+
+def _with_point(value: Any, decimal: str) -> Any:
+    """Return a number that stands as text with a decimal comma as text with a point."""
+    if decimal != "," or not isinstance(value, str) or not _WRITTEN.fullmatch(value.strip()):
+        return value
+    return plain_numbers(value.strip(), decimal).replace(",", ".")
 
 
 def _cells(path: Path) -> list[tuple[str, list[list[Any]]]]:

@@ -1,6 +1,7 @@
 """JSON: arrays by name, `{"time [s]": [...], "force [kN]": [...]}`, at the top or in objects below, or a list of rows.
 
 `{"unit": "mm", "values": [...]}` is a column too, and a single number beside arrays a column of one value.
+A list of channels, each with its name, unit and samples, is a table of these.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.sheet import FileTable, table_of_rows, tables_of_tree
+from pzd.rig.files.sheet import FileTable, named_channels, table_of_rows, tables_of_tree
 from pzd.schema.errors import DataError, at
 
 KIND = "a JSON file"
@@ -45,7 +46,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     if isinstance(read, list) and read and all(isinstance(row, dict) for row in read):
         if not any(isinstance(cell, list | dict) for row in read for cell in row.values()):
             return [table_of_rows("", read)]
-        read = {str(number + 1): below for number, below in enumerate(read)}
+        read = named_channels(read) or {str(number + 1): below for number, below in enumerate(read)}
     return tables_of_tree(read) if isinstance(read, dict) else []
 
 

@@ -12,7 +12,7 @@ import re
 from array import array
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, islice
+from itertools import chain, compress, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,6 +51,8 @@ _AT_A_TIME, _CHARACTERS = 4096, 65536
 """Lines and characters that are held at a time as strings of a line or a cell, which take many times the file."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
+_EMPTY_LINE = re.compile(r"\n[ \t]*\n")
+"""Between rows; where no clock tells whether the recording goes on behind it, such a line is refused."""
 _UNIT_CELL = re.compile(r"[\[(]?\s*[A-Za-z\u00b5\u00b0%][A-Za-z0-9\u00b5\u00b0%/*^ ]{0,12}[\])]?")
 """A cell that may be a unit."""
 
@@ -131,7 +133,7 @@ def _lines_of(path: Path, entry: FilesEntry, wanted: Wanted) -> _Lines:
     text = text_of(path, entry.encoding)
     below = text[after_lines(text, entry.skip) :]
     rows = after_lines(below, (entry.header is None) + entry.units_row)
-    below = below[:rows] + plain_numbers(below[rows:])
+    below = below[:rows] + plain_numbers(below[rows:], entry.decimal)
     quoted = entry.comment is not None or '"' in text
     return _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
 
@@ -151,6 +153,11 @@ def _plain_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
         body, empty = body[body.find("\n") + 1 :], empty + 1
     fields = _field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
     numbers = np.arange(fields.size) + entry.skip + above + empty + 1
+    if entry.rate_Hz is None and _EMPTY_LINE.search(body):
+        lines = body.split("\n")
+        filled = np.array([bool(line.strip()) for line in lines])
+        body = "\n".join(compress(lines, filled))
+        numbers, fields = numbers[filled], fields[filled]
     return _Lines([fields_of(line, separator) for line in top], body, numbers, fields, separator)
 
 
@@ -172,8 +179,8 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
         if len(heads) < above:
             heads.append([cell.strip() for cell in row])
             continue
-        if not numbers and not line.strip():
-            continue  # between the head and the first row
+        if not line.strip() and (not numbers or entry.rate_Hz is None):
+            continue
         numbers.append(number)
         fields.append(len(row))
         block.append(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row))
@@ -322,7 +329,8 @@ def _steps(
         yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
     if dropped:
-        yield ReadingStep("left out", None, f"{counted(dropped, 'line')} that begin with {entry.comment!r}", "")
+        kind = "empty" if entry.comment is None else f"empty or beginning with {entry.comment!r}"
+        yield ReadingStep("left out", None, f"{counted(dropped, 'line')}, {kind}", "")
     yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:
