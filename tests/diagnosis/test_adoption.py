@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from synthetic import TWO, all_but, campaign_of, damper_of, sine, sines
 
+from pzd.damper.effect import Effect
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis.adoption import (
@@ -25,12 +26,13 @@ from pzd.diagnosis.adoption import (
 from pzd.diagnosis.campaign import Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
-from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.least_squares import FitResult, fit
+from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.predictive_search import PredictiveSearch, interpolation_check
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import candidate, candidates, per_voltage_candidates, starts_of
+from pzd.diagnosis.search.candidates import Candidate, candidate, candidates, per_voltage_candidates, starts_of
 from pzd.fit.cross_validation import PredictionError
-from pzd.record import Record
+from pzd.record import Array, Record
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
 OTHER_TESTS = ((0.5, 0.02), (1.0, 0.03), (2.0, 0.03))
@@ -327,6 +329,31 @@ def test_beside_a_drift_that_pools_temperatures_a_second_effect_can_be_tried(rng
     (proposal,) = search._possible(evidence.whole, [drift])
     assert len(proposal.problem.base) == len(TWO) < len(base.base)
     search._additions(proposal.problem, proposal.fitted)
+
+
+def test_what_comes_to_nothing_takes_no_place_and_is_begun_anew(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else rounding decides which effects are tried: a pocket that moved nothing promised much on a measured damper."""
+    records = records_of(damper_of(TWO, gas_spring={"k_g": 8000.0}), rng)
+    config = DiagnoseConfig(forbid=all_but("gas_spring", "preload_offset", "asymmetry"))
+    selection, validation = plain_selection(records, config)
+    whole, plain = selection.initial_evidence.whole, selection.baseline
+    search = PredictiveSearch(validation, config, 2)
+    (first,) = search._further(whole, plain, 1)
+    assert first.effect == "gas_spring"
+    assert set(search.reached) == {"gas_spring"}
+
+    def comes_to_nothing(problem: Problem, before: FitResult, effect: Effect, start: Array | None) -> Candidate:
+        found = candidate(problem, before, effect, start)
+        return replace(found, explained=0.0) if effect.name == "gas_spring" else found
+
+    monkeypatch.setattr("pzd.diagnosis.predictive_search.candidate", comes_to_nothing)
+    search = PredictiveSearch(validation, config, 2)
+    tried = search._further(whole, plain, 1)
+    assert tried[0].effect == "gas_spring"
+    assert len(tried) > 1
+    assert "gas_spring" not in search.reached
 
 
 def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generator) -> None:
