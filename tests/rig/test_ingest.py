@@ -256,7 +256,6 @@ BREAKS: dict[str, tuple[Any, str]] = {
     "not a number": (lambda t: [*t[:7], t[7].replace(",100", ",nan"), *t[8:]], ":8: voltage_V: a number is needed"),
     "trailing comma": (lambda t: [t[0], t[1] + ",", *t[2:]], ":2: 5 fields where the header has 4"),
     "short row": (lambda t: [*t[:9], "0.1,0.2", *t[10:]], ":10: 2 fields where the header has 4"),
-    "blank row": (lambda t: [*t[:9], "", *t[9:]], ":10: 1 fields where the header has 4"),
     "repeated time beside a bad cell": (
         lambda t: [*t[:7], t[7].replace(",100", ",nan"), t[8], t[8], *t[9:]],
         ":10: time does not increase",

@@ -236,7 +236,10 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
         columns = [index for index, head in enumerate(sheet.header) if head in spec.headers]
         if len(columns) > 1:
             heads = " and ".join(sheet.header[c] for c in columns)
-            data_faults.append(f"{sheet.top}: {spec.own.name}: duplicate column ({heads})")
+            data_faults.append(
+                f"{sheet.top}: {spec.own.name}: duplicate column ({heads}); give one of them another name, or write "
+                "tests that stand side by side into files of their own"
+            )
         elif columns:
             unit = _unit(sheet, columns[0], spec)
             head = sheet.header[columns[0]]

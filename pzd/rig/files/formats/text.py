@@ -329,8 +329,8 @@ def _steps(
         yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
     if dropped:
-        kind = "empty" if entry.comment is None else f"empty or beginning with {entry.comment!r}"
-        yield ReadingStep("left out", None, f"{counted(dropped, 'line')}, {kind}", "")
+        kind = "that are empty" if entry.comment is None else f"that begin with {entry.comment!r}"
+        yield ReadingStep("left out", None, f"{counted(dropped, 'line')} {kind}", "")
     yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:
