@@ -59,6 +59,8 @@ def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, n
         (("r_0.5Amp", "r_2 Amps"), (0.5, 2.0)),
         (("r_0x1kV", "r_150V"), (100.0, 150.0)),
         (("r_40%", "r_80pct"), (40.0, 80.0)),
+        (("pwm_40%_a", "pwm80%_a"), (40.0, 80.0)),
+        (("strom0.5A", "Strom1A"), (0.5, 1.0)),
     ],
 )
 def test_levels_whose_units_differ_from_name_to_name_are_read_each_by_its_own(
@@ -70,6 +72,20 @@ def test_levels_whose_units_differ_from_name_to_name_are_read_each_by_its_own(
     config = load(tmp_path / "guess.yaml")
     found = ingest(config.rig, config.control.signal(), tmp_path).entries
     assert {entry.voltage_V for entry in found} == {*levels}
+
+
+@pytest.mark.parametrize("names", [("a_current=0.5", "a_current=1.0"), ("Current 0x5", "Current 1")])
+def test_a_number_behind_the_word_for_a_level_is_asked_for_its_unit(tmp_path: Path, names: tuple[str, str]) -> None:
+    for name in names:
+        write(tmp_path / f"{name}.csv", lines(PLAIN))
+    said = "\n".join(guessed(sorted(tmp_path.glob("*.csv"))))
+    assert "control: {name: current, unit: A}" in said
+    asked = "current:   # fill in: the unit of current in the files' names"
+    assert asked in said
+    (tmp_path / "guess.yaml").write_text(said.replace(asked, "current: A"), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    found = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert {entry.voltage_V for entry in found} == {0.5, 1.0}
 
 
 @pytest.mark.parametrize("mark", "_-")

@@ -205,7 +205,7 @@ def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, st
     """Return by folder the control signal in its name; nothing with one folder, or where a name has none."""
     folders = sorted({path.parent for path in paths})
     found = value_in_names([folder.name for folder in folders], control.name) if len(folders) > 1 else None
-    if found is None:
+    if found is None or found[1] is None:
         return {}
     values = ((folder, re.search(found[0], folder.name)) for folder in folders)
     return {folder: f"{number_in_name(match[1])} {found[1]}".strip() for folder, match in values if match}
@@ -219,7 +219,7 @@ def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:
 
 def _from_names(
     files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
-) -> tuple[str | None, dict[str, str]]:
+) -> tuple[str | None, dict[str, str | None]]:
     """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
     names = [file.path.stem for file in files]
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
@@ -235,9 +235,9 @@ def _keys(
     control: Control,
     columns: dict[Quantity, str],
     pattern: str | None,
-    in_names: dict[str, str],
+    in_names: Mapping[str, str | None],
 ) -> Iterator[str]:
-    """Write the keys of an entry; `in_names` holds the units of the quantities in the pattern."""
+    """Write the keys of an entry; `in_names` holds the units of the quantities in the pattern, None where unknown."""
     dialect = files[0].dialect
     several = {} if dialect.headless else claims(dialect.header, dialect.units, control)
     yield from _dialect_keys(dialect)
@@ -252,6 +252,11 @@ def _keys(
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         yield from _asked_columns(files[0], columns, missing, several)
     units = [*_units(named, dialect), *(f"  {name}: {written(unit)}" for name, unit in in_names.items() if unit)]
+    units += [
+        f"  {name}:   # fill in: the unit of {name} in the files' names"
+        for name, unit in in_names.items()
+        if unit is None
+    ]
     doubt = None if pattern or VOLTAGE in columns else doubt_in_names([file.path.stem for file in files])
     units += [f"  {doubt[0]}: {doubt[1]}"] if doubt else []
     units += list(_asked_units(files[0], columns, [q for q in missing if q not in several]))

@@ -212,33 +212,47 @@ def _bare(header: str) -> str:
 
 # --- Values in the name of a file: control signal, temperature, position of the clickers ---
 
-_NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.xp,][0-9]+)?)"
+_NUMBER = r"(?<![A-Za-z0-9])(?<![0-9][.,])([0-9]+(?:[.xp,][0-9]+)?)"
+_UNITS_IN_NAMES = {
+    "voltage": "mV|kV|V|Volts?",
+    "current": "mA|A|Amps?",
+    "pwm": "%|pct|percent",
+    "temperature": "degC|C",
+}
 _VALUES = {
-    "voltage": re.compile(rf"{_NUMBER} ?(mV|kV|V|Volts?)(?![A-Za-z])"),
-    "current": re.compile(rf"{_NUMBER} ?(mA|A|Amps?)(?![A-Za-z])"),
-    "pwm": re.compile(rf"{_NUMBER} ?(%|pct|percent)(?![A-Za-z])"),
-    "temperature": re.compile(rf"{_NUMBER}(degC|C)(?![A-Za-z])"),
+    name: re.compile(rf"{_NUMBER}{'' if name == 'temperature' else ' ?'}({units})(?![A-Za-z])")
+    for name, units in _UNITS_IN_NAMES.items()
 }
 """150V, 0x5A, 0p5A, 0.5 Amp, 40pct, 22degC."""
+_WORDS_IN_NAMES = {
+    "voltage": "volt(?:age)?|spannung|tension",
+    "current": "current|strom|courant|corriente",
+    "pwm": "pwm|duty",
+    "temperature": "temp(?:eratur)?e?",
+}
+"""Words before a number whose unit may be missing: current=0.5, pwm40."""
 _CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
 """C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
 
 
-def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
+def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
     """Return the pattern that finds a quantity in every name, and its unit; None where a name lacks it.
 
-    Where the units differ (500mA, 1A) they are in the group of the pattern, and the unit returned is empty.
+    Where the units differ (500mA, 1A) they are in the group of the pattern, and the unit returned is empty; where a
+    word stands for it (current=0.5) there is None.
 
     Parameters
     ----------
     stems : names of files, without their ending
-    name : `voltage`, `current` or `temperature`
+    name : `voltage`, `current`, `pwm` or `temperature`
     """
     matches = [_VALUES[name].search(stem) if name in _VALUES else None for stem in stems]
-    units = sorted({match[2] for match in matches if match})
-    if not all(matches) or (name == "temperature" and len(units) > 1):
-        return None
     found = [(stem, match) for stem, match in zip(stems, matches, strict=True) if match]
+    units = sorted({match[2] for _, match in found})
+    if len(found) < len(stems):
+        return _value_behind_word(stems, name) if name in _VALUES else None
+    if name == "temperature" and len(units) > 1:
+        return None
     if name != "temperature" and any(_two_numbers(stem, match) for stem, match in found):
         return None
     minus = {minus_before(stem, match.start(1)) for stem, match in found if stem[: match.start(1)].endswith("-")}
@@ -251,6 +265,20 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
         return f"(?P<{name}>{number}{blank}(?:{'|'.join(units)}))(?![A-Za-z])", ""
     unit = units[0]
     return f"(?P<{name}>{number}){blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+
+
+def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
+    """Return the pattern that finds a number behind the word for a quantity in every name, and its unit if any."""
+    word = f"(?i:{_WORDS_IN_NAMES[name]})[ _=]?"
+    number = "[0-9]+(?:[.xp,][0-9]+)?"
+    whole = re.compile(rf"(?<![A-Za-z]){word}{number}({_UNITS_IN_NAMES[name]})?(?![A-Za-z0-9])")
+    matches = [whole.search(stem) for stem in stems]
+    units = {match[1] for match in matches if match}
+    if not all(matches) or len(units) != 1:
+        return None
+    unit = units.pop()
+    spelled_unit = None if unit is None else {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+    return f"(?<![A-Za-z]){word}(?P<{name}>{number}){unit or ''}(?![A-Za-z0-9])", spelled_unit
 
 
 _SAID = re.compile(
