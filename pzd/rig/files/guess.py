@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +24,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
-from pzd.rig.files.dialect import BLANKS, after_lines
+from pzd.rig.files.dialect import BLANKS
 from pzd.rig.files.formats import TEXT, lines_above, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
 from pzd.rig.files.reading import read
@@ -143,6 +145,19 @@ class SniffedFile:
         units = self.dialect.units
         return units[self.dialect.header.index(head)] if units else None
 
+    @cached_property
+    def above(self) -> tuple[str, ...]:
+        """The lines above the header of every table of a file of text or loose cells."""
+        skip = self.dialect.skip
+        if not skip:
+            return ()
+        if self.form == TEXT:
+            with self.path.open(encoding=self.dialect.encoding, errors="replace") as file:
+                return ("".join(islice(file, skip)),)
+        entry = _as_sniffed(self)
+        sheet = read_sheet(self.path, entry, Wanted(numbers=frozenset(self.dialect.header)), "rig.files")
+        return lines_above(self.path, entry, sheet, "rig.files")
+
     @property
     def layout(self) -> tuple[object, ...]:
         """Key that is equal for files that one entry can read."""
@@ -181,7 +196,7 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
         levels = _levels_of_folders([file.path for file in group], control)
-        above = [text for file in group for text in _above(file)]
+        above = [text for file in group for text in file.above]
         for path, members in _patterns([file.path for file in group]):
             mine = [file for file in group if file.path in members]
             d = mine[0].dialect
@@ -322,7 +337,7 @@ _RECORDER = ("V", "mV", "Volt", "Volts", "count", "counts", "bit", "digit", "-",
 
 def _rate(file: SniffedFile) -> float | None:
     """Return the sampling rate [Hz] in the lines above the header of a text file, None without one."""
-    found = next(filter(None, map(_RATE.search, _above(file))), None) if file.form == TEXT else None
+    found = next(filter(None, map(_RATE.search, file.above)), None) if file.form == TEXT else None
     return float(found[1].replace(",", ".")) * (1e3 if found[2] else 1.0) if found else None
 
 
@@ -563,21 +578,10 @@ def _control(files: Sequence[SniffedFile]) -> Control:
     controlled = any(VOLTAGE in dict(file.columns) for file in files)
     if control != Control() or controlled:
         return control
-    above = [text for file in files for text in _above(file)]
+    above = [text for file in files for text in file.above]
     others = (other for other in CONTROLS if other != Control())
     told = (each for each in others if _in_names(each, files) or said_above(above, [VOLTAGE], each)[1])
     return next(told, control)
-
-
-def _above(file: SniffedFile) -> tuple[str, ...]:
-    """Return the lines above the header of every table of a file of text or loose cells."""
-    if not file.dialect.skip:
-        return ()
-    if file.form == TEXT:
-        text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace").replace("\r\n", "\n")
-        return (text[: after_lines(text, file.dialect.skip)],)
-    sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset(file.dialect.header)), "rig.files")
-    return lines_above(file.path, _as_sniffed(file), sheet, "rig.files")
 
 
 def _in_names(control: Control, files: Sequence[SniffedFile]) -> bool:

@@ -149,7 +149,7 @@ def lines_above(path: Path, entry: FilesEntry, sheet: Sheet, place: str) -> tupl
     rows = rows_in(path, module)
     if rows is None:
         raise ConfigError(f"{place}.preamble: {module.KIND} has nothing of the kind ({at(path)})")
-    above = (rows[table][: entry.skip] for table in sheet.tables)
+    above = (rows.get(table, [])[: entry.skip] for table in sheet.tables)
     return tuple("\n".join("\t".join(filter(None, cells)) for cells in table) for table in above)
 
 
