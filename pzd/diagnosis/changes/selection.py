@@ -36,6 +36,8 @@ BETTER = 1e-3
 AS_GOOD = 2.0
 """Multiple of what the best fit leaves up to which another one is as good: by the triangle inequality, what has no name
 may make either leave so much."""
+OTHER_STARTS = 2
+"""Further starts from which a fit is begun that ended where a number of the change does nothing."""
 SCALED = (0.05, 3.0)
 """Limits of the factor on a start by its linearised step."""
 
@@ -49,6 +51,8 @@ class Promise:
     candidate: Candidate
     start: Array
     """From which it was taken."""
+    others: tuple[Array, ...] = ()
+    """The next best starts."""
 
 
 def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
@@ -93,6 +97,11 @@ def _best_step(candidate: Candidate, columns: Array, r: Array) -> tuple[Array, A
     return rest - columns[:, 1:] @ step, np.concatenate([[1.0], step])
 
 
+def _each_shows(columns: Sequence[Array], count: int) -> bool:
+    """Whether each of the last columns (n, p) of all tests, as many as are counted, shows in some of them."""
+    return bool(np.all(np.any([np.any(own[:, -count:] != 0.0, axis=0) for own in columns], axis=0)))
+
+
 def _held_out_error(slopes: Sequence[Array], residuals: Sequence[Array]) -> float:
     """Return the sum of squares of what held-out tests leave about the linear fits without their folds.
 
@@ -121,6 +130,10 @@ class Search:
     """Least r.m.s. force of a change, as a share of each test's peak."""
     _starts: dict[Candidate, list[tuple[Array, list[Array]]]] = field(default_factory=dict, repr=False)
     _fits: dict[frozenset[Candidate], Fitted] = field(default_factory=dict, repr=False)
+    _begun_anew: set[frozenset[Candidate]] = field(default_factory=set, repr=False)
+    """Which fits were begun again from other starts."""
+    _begun_beside: set[tuple[frozenset[Candidate], frozenset[Candidate]]] = field(default_factory=set, repr=False)
+    """Which fits were begun again where they stood beside another change."""
     _flexible: bool = False
 
     def nothing(self) -> Fitted:
@@ -145,16 +158,21 @@ class Search:
         r = projected_out(frame, r)
         found = []
         for candidate in tried:
-            best, at = float(r @ r), np.array(candidate.starts[0])
+            steps: list[tuple[float, Array]] = []
             for start, columns in self._linearised(candidate):
+                if len(start) > 1 and not _each_shows(columns, len(start)):
+                    continue  # from where a number does nothing no search finds the place at which it does
                 own = projected_out(frame, np.concatenate([W @ c for W, c in zip(whiteners, columns, strict=True)]))
                 if not np.all(np.isfinite(own)):
                     continue
                 left, step = _best_step(candidate, own, r)
-                if left @ left < best:
-                    best, at = float(left @ left), _scaled(candidate, start, step)
+                if left @ left < r @ r:
+                    steps.append((float(left @ left), _scaled(candidate, start, step)))
+            steps.sort(key=lambda each: each[0])
+            steps = steps or [(float(r @ r), np.array(candidate.starts[0]))]
             penalty = len(candidate.coordinates) * float(np.log(self.regression.likelihood.size))
-            found.append(Promise(best + penalty, candidate, at))
+            others = tuple(at for _, at in steps[1 : 1 + OTHER_STARTS])
+            found.append(Promise(steps[0][0] + penalty, candidate, steps[0][1], others))
         return sorted(found, key=lambda promise: promise.criterion)
 
     def _linearised(self, candidate: Candidate) -> list[tuple[Array, list[Array]]]:
@@ -174,7 +192,15 @@ class Search:
 
     def _with(self, before: Fitted, promise: Promise) -> Fitted:
         together = (*before.candidates, promise.candidate)
-        return self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
+        found = self._fit(together, np.concatenate([before.values, promise.start]), before.scatter)
+        if self._each_number_shows(found) or frozenset(together) in self._begun_anew:
+            return found
+        # The search went to where a number does nothing, and none leads back from there.
+        self._begun_anew.add(frozenset(together))
+        starts = (np.concatenate([before.values, other]) for other in promise.others)
+        fits = [found, *(self.regression.fit(together, start, before.scatter) for start in starts)]
+        self._fits[frozenset(together)] = min(fits, key=lambda f: f.bic)
+        return self._fits[frozenset(together)]
 
     def _tried(self, before: Fitted, *, in_place: bool = False) -> list[Candidate]:
         """Return the candidates that are asked beside some; in the place of one, two kinds of flexible laws too.
@@ -326,21 +352,34 @@ class Search:
         """Return the fit without one of its changes, the others fitted again."""
         kept = tuple(c for c in fitted.candidates if c is not candidate)
         start = np.concatenate([fitted.values_of(c) for c in kept]) if kept else np.zeros(0)
-        return self._fit(kept, start, fitted.scatter)
+        known, asked = self._fit(kept, start, fitted.scatter), (frozenset(kept), frozenset(fitted.candidates))
+        if not kept or known.bic <= fitted.bic or asked in self._begun_beside:
+            return known
+        # An earlier fit of the others may have begun elsewhere and ended short of where they stand beside it.
+        self._begun_beside.add(asked)
+        anew = self.regression.fit(kept, start, fitted.scatter)
+        self._fits[frozenset(kept)] = min(known, anew, key=lambda f: f.bic)
+        return self._fits[frozenset(kept)]
 
-    def _admissible(self, fitted: Fitted, least: float) -> bool:
+    def _admissible(self, fitted: Fitted, least: float, *, at_limit: bool = False) -> bool:
         """Whether the last change of a fit is physical, makes at least so much force, and each number of it shows.
 
         A law of which a number does nothing is another law: a valve that is open from the yield on is a smaller C.
+        `at_limit` allows it.
         """
         first, new = self.regression.response.first, fitted.candidates[-1]
         if not first.is_natural(fitted.coordinates, fitted.values.tolist()) or self.size_of(fitted, new) < least:
             return False
+        return at_limit or self._each_number_shows(fitted)
+
+    def _each_number_shows(self, fitted: Fitted) -> bool:
+        """Whether each number of the last change of a fit moves the force."""
+        new = fitted.candidates[-1]
         if len(new.coordinates) == 1:
             return True
         columns = self.regression.columns(fitted.coordinates, fitted.values)
-        shows = np.any([np.any(own != 0.0, axis=0) for own in columns], axis=0)
-        return all(s for s, c in zip(shows, fitted.coordinates, strict=True) if c in new.coordinates)
+        its = [i for i, c in enumerate(fitted.coordinates) if c in new.coordinates]
+        return _each_shows([own[:, its] for own in columns], len(its))
 
     def _over_tests(self, squares: Sequence[float]) -> float:
         """Return the root of the mean of one square a test: of those compared cycle by cycle, where there are any.
@@ -431,7 +470,9 @@ class Search:
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
         near = [f for f in fits if self._is_rival(f, best, less) and self._leaves_less(f, less)]
-        return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted))]
+        # A C that is smaller at one value of the control signal alone may be a valve that opens just above the yield.
+        limit = candidate.per_voltage
+        return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted), at_limit=limit)]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or it leaves no more than the model misses.

@@ -119,6 +119,38 @@ def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_num
     assert names(found.changes()) == ["C"]
 
 
+@pytest.mark.parametrize("slope", [0.1, 0.25])
+def test_a_valve_that_opens_just_above_the_yield_at_one_level_is_found_and_no_smaller_damping(
+    slope: float, rng: np.random.Generator
+) -> None:
+    """From below the yield, where it opens does nothing, and no search finds the way to where it does."""
+    for draw in rng.spawn(2):
+        rows = [
+            BaseRow(
+                voltage_V=volts, T0_N=share * FORCE, C_Ns_per_m=0.4 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE
+            )
+            for volts, share in ((0.0, 0.1), (100.0, 0.6))
+        ]
+        damper = Damper(base=tuple(rows))
+        opened = damper.with_effect("relief_valve", {"F_r": 0.62 * FORCE, "C_r": slope * FORCE / SPEED})
+        changes = found(campaign(damper, draw), campaign(opened, draw))
+        assert names(changes) == ["relief_valve"]
+        opens = next(c for c in changes.changes if c.parameter == "F_r")
+        assert opens.to == pytest.approx(0.62 * FORCE, rel=0.02)
+
+
+def test_a_smaller_damping_at_one_level_may_be_a_valve_that_opens_at_the_yield(rng: np.random.Generator) -> None:
+    """At the other level, where it stays shut, C is the same."""
+    rows = [
+        BaseRow(voltage_V=volts, T0_N=share * FORCE, C_Ns_per_m=0.4 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
+        for volts, share in ((0.0, 0.1), (100.0, 0.6))
+    ]
+    smaller = (rows[0], rows[1].model_copy(update={"C_Ns_per_m": 0.85 * rows[1].C_Ns_per_m}))
+    changes = found(campaign(Damper(base=tuple(rows)), rng), campaign(Damper(base=smaller), rng))
+    assert changes.verdict == "ambiguous"
+    assert {"C", "relief_valve"} <= names_told(changes)
+
+
 def test_a_valve_that_opens_between_two_starts_of_the_search_promises_what_it_explains(
     rng: np.random.Generator,
 ) -> None:
