@@ -25,6 +25,7 @@ from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effe
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
 from pzd.fit.cross_validation import STANDARD_ERRORS, PredictionError, log_ratios, paired_t
+from pzd.fit.intervals import LEVEL
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
@@ -66,7 +67,9 @@ class Adoption:
 # --- Removal of effects that worsen the prediction
 
 
-def adopt_effects(selection: Selection, validation: CrossValidation, forced: Sequence[str], unit: str) -> Adoption:
+def adopt_effects(
+    selection: Selection, validation: CrossValidation, forced: Sequence[str], unit: str, level: float = LEVEL
+) -> Adoption:
     """Remove effects that worsen the prediction of held-out tests, one at a time, down to the baseline if need be.
 
     An effect is removed if the damper predicts better without it. The last one is removed for as long as the baseline
@@ -78,9 +81,10 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
     validation : cross-validation of the tests
     forced : effects that the config asks for, whatever they do
     unit : of the control signal, for the reason
+    level : standard errors by which the strength of an effect has to differ from none
     """
     baseline, reference = validation.baseline_error(), validation.baseline_interpolation_error
-    kept, rejection = _without_impossible(_without_undetermined(selection, forced), forced)
+    kept, rejection = _without_impossible(_without_undetermined(selection, forced, level), forced)
     while kept.adopted:
         error, by_criterion = _better_predicting_fit(kept, validation)
         between = validation.interpolation_error(kept.fitted.damper, by_criterion=by_criterion)
@@ -98,7 +102,7 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
             if found is not None:
                 evidence = replace(kept.final_evidence, whole=found[0])
                 kept = replace(kept, fitted=found[1], final_evidence=evidence)
-                if none := first_undetermined(evidence.whole, kept.fitted, forced):
+                if none := first_undetermined(evidence.whole, kept.fitted, forced, level):
                     kept = _without_effect(kept, *none)
                     continue
             return Adoption(kept, baseline, error, between, by_criterion=by_criterion)
@@ -108,10 +112,10 @@ def adopt_effects(selection: Selection, validation: CrossValidation, forced: Seq
     return Adoption(kept, baseline, baseline, reference, rejection)
 
 
-def _without_undetermined(selection: Selection, forced: Sequence[str]) -> Selection:
+def _without_undetermined(selection: Selection, forced: Sequence[str], level: float) -> Selection:
     """Remove effects that the fit does not determine, one at a time, each time with the rest fitted again."""
     kept = selection
-    while kept.adopted and (none := first_undetermined(kept.final_evidence.whole, kept.fitted, forced)):
+    while kept.adopted and (none := first_undetermined(kept.final_evidence.whole, kept.fitted, forced, level)):
         kept = _without_effect(kept, *none)
     return kept
 

@@ -29,6 +29,7 @@ from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
+from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
@@ -61,7 +62,9 @@ def conclude(
     config : thresholds, forced and forbidden effects
     unit : of the control signal, for the reason
     """
-    adoption = _polished(adopt_effects(selection, validation, config.force, unit))
+    # By its interval, which counts how the tests disagree, an effect is told from its absence as from any rival.
+    level = max(LEVEL, float(np.sqrt(config.rival_bic)))
+    adoption = _polished(adopt_effects(selection, validation, config.force, unit, level))
     if adoption.rejection:
         decision = Decision("unexplained", adoption.rejection, None)
     else:

@@ -14,7 +14,7 @@ from pzd.diagnosis.adoption import adopt_effects
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import cross_validation_of
-from pzd.diagnosis.fit.least_squares import FitResult, fit
+from pzd.diagnosis.fit.least_squares import FitResult, fit, standard_errors
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.predictive_search import CriterionFit, without_off
 from pzd.diagnosis.search.acceptance import Selection, insufficient_support
@@ -27,6 +27,7 @@ from pzd.diagnosis.search.determination import (
     at_limits,
     cancelling,
     opens_below_friction,
+    showing,
     undetermined,
 )
 from pzd.record import Record
@@ -65,6 +66,14 @@ def test_a_strength_that_may_be_zero_is_none(rng: np.random.Generator) -> None:
     problem = problem_on(BASE, rng, SEVERAL)
     found = fitted_from(problem, orifice_quadratic={"q": 500.0})
     assert undetermined(problem, found) == {"orifice_quadratic": MAY_BE_OFF}
+
+
+def test_a_strength_is_told_from_none_by_so_many_of_its_errors_as_are_asked(rng: np.random.Generator) -> None:
+    fitted = fitted_from(problem_on(BASE, rng, SEVERAL), gas_spring={"k_g": 4000.0})
+    (of_spring,) = standard_errors(fitted)
+    away = abs(fitted.damper.effects["gas_spring"]["k_g"]) / of_spring
+    assert showing(fitted, 0.9 * away) == {"gas_spring"}
+    assert showing(fitted, 1.1 * away) == set()
 
 
 def test_a_stop_at_the_end_of_the_recorded_stroke_ends_at_a_limit(rng: np.random.Generator) -> None:

@@ -29,15 +29,16 @@ CANCELLED = "stand-in: cancels another effect, and neither is known by itself"
 ANOTHER_DAMPING = "stand-in: opens below T0, where it is another C"
 
 
-def undetermined(problem: Problem, fitted: FitResult) -> dict[str, str]:
+def undetermined(problem: Problem, fitted: FitResult, level: float = LEVEL) -> dict[str, str]:
     """Return the effects of a fit that are none, each with the reason.
 
     Parameters
     ----------
     problem : observations and limits of the fit
     fitted : its optimum
+    level : standard errors by which a strength has to differ from none
     """
-    shown = showing(fitted)
+    shown = showing(fitted, level)
     found = {name: MAY_BE_OFF for name in fitted.effects if name not in shown}
     found |= {name: AT_LIMIT for name in at_limits(fitted) if name not in found}
     if opens_below_friction(fitted.damper):
@@ -45,13 +46,15 @@ def undetermined(problem: Problem, fitted: FitResult) -> dict[str, str]:
     return found | {name: CANCELLED for pair in cancelling(problem, fitted) for name in pair if name not in found}
 
 
-def showing(fitted: FitResult) -> set[str]:
-    """Return the effects that are not off: the 95 % interval of the strength, the first parameter, excludes that value.
+def showing(fitted: FitResult, level: float = LEVEL) -> set[str]:
+    """Return the effects that are not off: the interval of the strength, the first parameter, excludes that value.
+
+    By default that of 95 %, else so many standard errors to either side; it is wider where the tests disagree.
 
     One whose parameters differ by voltage shows where that of any voltage does.
     """
     strengths = {name: library()[name].parameters[0] for name in fitted.effects if name in library()}
-    unknowns = zip(fitted.unknowns, LEVEL * standard_errors(fitted), strict=True)
+    unknowns = zip(fitted.unknowns, level * standard_errors(fitted), strict=True)
     return {
         u.effect
         for u, error in unknowns
@@ -115,7 +118,9 @@ def _forces(problem: Problem, damper: Damper) -> Array:
     return np.concatenate([o.at_compared(shown_force(o, damper)) / o.peak for o in problem.observations])
 
 
-def first_undetermined(problem: Problem, fitted: FitResult, kept: Sequence[str]) -> tuple[str, str] | None:
+def first_undetermined(
+    problem: Problem, fitted: FitResult, kept: Sequence[str], level: float = LEVEL
+) -> tuple[str, str] | None:
     """Return the last adopted of the effects that are none, and why; None where the fit determines all.
 
     Parameters
@@ -123,6 +128,7 @@ def first_undetermined(problem: Problem, fitted: FitResult, kept: Sequence[str])
     problem : observations and limits of the fit
     fitted : its optimum
     kept : effects that stay whatever they do
+    level : standard errors by which a strength has to differ from none
     """
-    found = undetermined(problem, fitted)
+    found = undetermined(problem, fitted, level)
     return next(((name, found[name]) for name in reversed(fitted.effects) if name in found and name not in kept), None)
