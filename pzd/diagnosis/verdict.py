@@ -29,6 +29,7 @@ from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
+from pzd.diagnosis.search.determination import first_undetermined
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
 from pzd.signals.measures import rms
@@ -62,13 +63,16 @@ def conclude(
     config : thresholds, forced and forbidden effects
     unit : of the control signal, for the reason
     """
-    # By its interval, which counts how the tests disagree, an effect is told from its absence as from any rival.
+    adoption = _polished(adopt_effects(selection, validation, config.force, unit))
+    decision = _decided(adoption, config)
+    # By its interval, which counts how the tests disagree, what gets a name is told from its absence as from a rival.
     level = max(LEVEL, float(np.sqrt(config.rival_bic)))
-    adoption = _polished(adopt_effects(selection, validation, config.force, unit, level))
-    if adoption.rejection:
-        decision = Decision("unexplained", adoption.rejection, None)
-    else:
-        decision = decide(adoption.selection, config)
+    kept = adoption.selection
+    if decision.verdict != "unexplained" and first_undetermined(
+        kept.final_evidence.whole, kept.fitted, config.force, level
+    ):
+        adoption = _polished(adopt_effects(selection, validation, config.force, unit, level))
+        decision = _decided(adoption, config)
     if decision.verdict != "unexplained":
         trend = nuisance_trend(selection.initial_evidence.campaign, adoption.selection.fitted.damper, config)
         if trend is not None:
@@ -87,6 +91,12 @@ def conclude(
             words = f"kept-back tests are predicted better with {' and '.join(added)}, whatever {stands} for"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
     return adoption, decision
+
+
+def _decided(adoption: Adoption, config: DiagnoseConfig) -> Decision:
+    if adoption.rejection:
+        return Decision("unexplained", adoption.rejection, None)
+    return decide(adoption.selection, config)
 
 
 def _polished(adoption: Adoption) -> Adoption:

@@ -255,8 +255,8 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
         found.append(_warming(first.damper, max(map(abs, warmer))))
     for name, effect in {**library(), **fitted_laws()}.items():
         present = name in first.damper.effects
-        if name in NOT_HERE or (not present and name in fitted_laws()):
-            continue
+        if name in NOT_HERE or (not present and (name in fitted_laws() or effect.asked_last)):
+            continue  # what diagnose asks for the prediction alone is no name of what is newly there
         if effect.needs is not None:
             continue
         found += _present(first, name) if present else [_absent(first, name)]
