@@ -74,7 +74,8 @@ class DiagnoseConfig(Frozen):
     adopt_bic: float = Field(default=-20.0, le=0.0)
     """An effect pays when it changes the Bayesian information criterion by at most this."""
     rival_bic: float = Field(default=10.0, ge=0.0)
-    """Effects whose criterion lies within this of the best are its rivals."""
+    """Effects whose criterion lies within this of the best are its rivals; so is none where a strength is no more than
+    the root of it in its own errors."""
     most_effects: int = Field(default=3, ge=1, le=5)
     """Most effects adopted one after another."""
     most_added: int = Field(default=3, ge=0, le=5)
