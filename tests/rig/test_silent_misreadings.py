@@ -173,13 +173,21 @@ def test_a_header_below_a_blank_line_and_a_title_among_the_data_is_named_as_such
     assert "a.csv:504: the header stands here again and once more below" in said
 
 
-@pytest.mark.parametrize(("cell", "decimal"), [("1.129,9", ","), ("1,129.9", "."), ("-12 129,9", ",")])
+@pytest.mark.parametrize(("cell", "decimal"), [("1.129,", ","), ("1,129.9", "."), ("-12 129,9", ",")])
 def test_grouped_thousands_are_reported_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
     text = [line.replace(".", decimal) for line in lines(CANONICAL, separator=";")]
     text[7] = ";".join([*text[7].split(";")[:2], cell, *text[7].split(";")[3:]])
     write(tmp_path / "a.csv", text)
     said = refused(tmp_path, {"path": "*.csv", "separator": ";", "decimal": decimal})
     assert f"force_N: a number is needed (got {cell!r}); write the file without grouping thousands" in said[0]
+
+
+def test_a_point_before_three_digits_and_a_decimal_comma_parts_thousands(tmp_path: Path) -> None:
+    text = [line.replace(".", ",") for line in lines(CANONICAL, separator=";")]
+    text[7] = ";".join([*text[7].split(";")[:2], "-1.129,9", *text[7].split(";")[3:]])
+    write(tmp_path / "a.csv", text)
+    (record,) = run(tmp_path, {"path": "*.csv", "separator": ";", "decimal": ","}).records
+    assert record.force[6] == -1129.9
 
 
 def test_a_clock_is_a_column_or_counted_and_not_both(tmp_path: Path) -> None:

@@ -21,6 +21,10 @@ from pzd.diagnosis.changes.selection import Search
 from pzd.fit.intervals import LEVEL, SINGULAR, by_what_was_left_out
 from pzd.record import Array
 
+LEAST_APART = 1e-3
+"""Share of its own force by which each coordinate differs from all others, at least.
+
+Reason: two that do the same to a thousandth (mean square) are already known thirty times as badly as either alone."""
 CROSS_STEP = 0.03
 """Step of a coordinate of the first state over which the force of a change is differenced.
 
@@ -127,7 +131,7 @@ class Uncertainty:
         """Return (p,) the standard errors were nothing left out, and (p,) those by what was."""
         covariance = self._regression.covariance(columns, residuals, self.fitted.scatter)
         slopes = self.slopes(columns)
-        unnamed = hides(self.search.left(self.fitted), slopes)
+        unnamed = hides(self.search.left(self.fitted), slopes) * self._told_apart(columns)
         missed = self._missed_of_response(coordinates, slopes) * values
         through = self.through_first_state(columns)
         alone = np.maximum(np.diag(covariance), 0.0) + unnamed**2 + missed**2 + through**2
@@ -137,6 +141,20 @@ class Uncertainty:
         """Return (p,) the r.m.s. force by one unit of every coordinate, each test in units of its peak."""
         squares = [np.sum(own**2, axis=0) / c.peak**2 for own, c in zip(columns, self._comparisons, strict=True)]
         return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
+    def _told_apart(self, columns: Sequence[Array]) -> Array:
+        """Return (p,) by how much further a force without a name moves each coordinate with the others free.
+
+        All of it may lie in any one direction: where a valve opens and how far go together, and each is known as badly
+        as the tests tell them apart.
+
+        Equation: sqrt(diag R^-1), R the correlation of the slopes
+        """
+        power = np.mean([own.T @ own / c.peak**2 for own, c in zip(columns, self._comparisons, strict=True)], axis=0)
+        size = np.sqrt(np.diag(power))
+        size = np.where(size > 0.0, size, 1.0)
+        alike = power / np.outer(size, size) + LEAST_APART * np.eye(size.size)
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(alike))))
 
     def _missed_of_response(self, coordinates: Sequence[Coordinate], slopes: Array) -> Array:
         """Return (p,) the share to which it is not known how the force follows a coordinate.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
 from pzd.diagnosis.changes.comparison import Findings, Missed, changes_between, comparisons_of, findings_between
 from pzd.diagnosis.changes.regression import Fitted
-from pzd.diagnosis.changes.selection import _scaled
+from pzd.diagnosis.changes.selection import Search, _scaled
 from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
@@ -149,6 +151,18 @@ def test_a_smaller_damping_at_one_level_may_be_a_valve_that_opens_at_the_yield(r
     changes = found(campaign(Damper(base=tuple(rows)), rng), campaign(Damper(base=smaller), rng))
     assert changes.verdict == "ambiguous"
     assert {"C", "relief_valve"} <= names_told(changes)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
+def test_a_force_without_a_name_moves_two_coordinates_as_far_as_they_are_told_apart(correlation: float) -> None:
+    """Equation: 1/sqrt(1 - r^2) of two with correlation r."""
+    columns = np.array([[1.0, correlation], [0.0, np.sqrt(1.0 - correlation**2)]]) * [3.0, 0.02]
+    comparison = SimpleNamespace(peak=50.0)
+    uncertainty = Uncertainty(
+        cast("Search", SimpleNamespace(regression=SimpleNamespace(comparisons=(comparison,)))), cast("Fitted", None)
+    )
+    expected = 1.0 / np.sqrt(1.0 - correlation**2)
+    assert uncertainty._told_apart([columns]) == pytest.approx([expected, expected], rel=0.03)
 
 
 def test_a_valve_that_opens_between_two_starts_of_the_search_promises_what_it_explains(
