@@ -239,6 +239,7 @@ SAID_ABOVE = {
     ("# Spulenstrom = 500 mA", "# Spulenstrom = 1250 mA"): (";.", "current", (0.5, 1.25)),
     ("Strom;0,5;A", "Strom;1,0;A"): (";,", "current", (0.5, 1.0)),
     ("Voltage,75,V", "Voltage,150,V"): (",.", "voltage", (75.0, 150.0)),
+    ("\u7535\u6d41\uff1a0.5 A", "\u7535\u6d41\uff1a1.0 A"): (";.", "current", (0.5, 1.0)),
     ("Piezo voltage (V):\t0", "Piezo voltage (V):\t150"): (";.", "voltage", (0.0, 150.0)),
 }
 
@@ -269,8 +270,15 @@ def test_what_is_the_same_above_every_header_is_no_level(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("above", "fault"),
     [
-        (["Valve: 0.5 A", "Limit: 3 A"], "match it in 2 places (0.5, 3)"),
-        (["Valve: off"], "do not match it"),
+        (
+            ["Valve: 0.5 A", "Limit: 3 A"],
+            "the lines above the header match it in 2 places (0.5 and 3); add what stands before the right one",
+        ),
+        (["Valve: off"], "no line above the header holds a number; where one does, say skip: N for so many lines"),
+        (
+            ["Valve: 12 V"],
+            "none of the lines above the header matches it; write it after one of them, as 'Valve: 12 V'",
+        ),
     ],
 )
 def test_lines_above_the_header_that_tell_two_levels_or_none_are_refused(
@@ -286,7 +294,7 @@ def test_lines_above_the_header_that_tell_two_levels_or_none_are_refused(
     }
     columns = {"columns": {"time": "t [s]", "displacement": "x [mm]", "force": "F [N]"}}
     (said,) = wrong(tmp_path, entry | columns, control=Control("current", "A"))
-    assert said == f"rig.files.0.preamble: the lines above the header {fault} (got a.csv)"
+    assert said == f"rig.files.0.preamble: {fault} (got a.csv)"
 
 
 def test_each_sheet_of_a_workbook_has_the_level_above_its_own_header(tmp_path: Path) -> None:

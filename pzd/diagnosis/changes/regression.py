@@ -200,6 +200,14 @@ class Fitted:
         """Mean square of what is left, over the comparisons [N^2]."""
         return float(np.mean([r @ r for r in self.residuals]))
 
+    def in_order(self, candidates: Sequence[Candidate]) -> Fitted:
+        """Return the same fit with its changes in another order; the last one is that which is asked about."""
+        if self.candidates == tuple(candidates):
+            return self
+        return replace(
+            self, candidates=tuple(candidates), values=np.concatenate([self.values_of(c) for c in candidates])
+        )
+
     def values_of(self, candidate: Candidate) -> Array:
         """Return the values of one candidate's coordinates."""
         return self.values[[self.coordinates.index(c) for c in candidate.coordinates]]

@@ -144,7 +144,7 @@ class Search:
         key = frozenset(candidates)
         if key not in self._fits:
             self._fits[key] = self.regression.fit(candidates, start, scatter)
-        return self._fits[key]
+        return self._fits[key].in_order(candidates)
 
     # --- What a candidate promises
 

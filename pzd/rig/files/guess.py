@@ -209,7 +209,8 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units | said)]
             if preamble:
                 lines.append(f"      preamble: {written(preamble)}    # in the lines above the header")
-            controlled = VOLTAGE in columns or control.name in units | said
+            asked = doubt_in_names([file.path.stem for file in mine]) is not None
+            controlled = VOLTAGE in columns or control.name in units | said or asked
             if not controlled and (level := levels.get(mine[0].path.parent)):
                 lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
                 controlled = True

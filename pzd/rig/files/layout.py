@@ -135,15 +135,15 @@ class Layout:
             found = list(re.finditer(self.entry.preamble or "", text, re.MULTILINE))
             told = list(dict.fromkeys(" and ".join(filter(None, match.groups())) for match in found))
             if len(told) != 1:
-                where = f"match it in {len(told)} places ({', '.join(told)})" if told else "do not match it"
-                faults.append(f"{self.place}.preamble: the lines above the header {where} (got {path.name})")
+                faults.append(f"{self.place}.preamble: {_preamble_misfit(told, text)} (got {path.name})")
                 continue
             groups = found[0].groupdict()
             settings.append(groups.pop("setting", None))
             of_tables.append(self._from_groups(groups, "preamble", path, faults))
         if len({*settings}) > 1:
             faults.append(
-                f"{self.place}.preamble: a file is of one setting (got {', '.join(map(str, settings))} in {path.name})"
+                f"{self.place}.preamble: a file is of one setting; write each into a file of its own "
+                f"(got {', '.join(map(str, settings))} in {path.name})"
             )
         if faults:
             raise ConfigError(list(dict.fromkeys(faults)))
@@ -193,6 +193,17 @@ class Layout:
             at_place = f"{self.place}.{key}: {path.name}"
             values[spec.quantity] = (_constant(f"{number} {unit}".rstrip(), spec, at_place, faults),)
         return values
+
+
+def _preamble_misfit(told: Sequence[str], text: str) -> str:
+    """Say in how many places the lines above a header match, or none of them, and what to do."""
+    if told:
+        places = f"{len(told)} places ({' and '.join(told)})"
+        return f"the lines above the header match it in {places}; add what stands before the right one"
+    first = next((line.strip() for line in text.split("\n") if any(c.isdigit() for c in line)), None)
+    if first is None:
+        return "no line above the header holds a number; where one does, say skip: N for so many lines"
+    return f"none of the lines above the header matches it; write it after one of them, as {first!r}"
 
 
 def _whole_number(name: str, first: int, last: int) -> str:

@@ -373,23 +373,24 @@ def named_channels(value: Any) -> dict[str, Any] | None:
         return None
     found: dict[str, Any] = {}
     for one in value:
-        keys = {key.lower(): key for key in one}
-        name, unit, samples = (
-            next((one[keys[key]] for key in among if key in keys), None) for among in (_NAMES, _UNITS, _VALUES)
-        )
+        name, unit, samples = (_under(one, keys) for keys in (_NAMES, _UNITS, _VALUES))
         if not isinstance(name, str) or name in found or not isinstance(samples, list | np.ndarray):
             return None
         found[name] = {"unit": unit, "values": samples} if isinstance(unit, str) else samples
     return found
 
 
+def _under(structure: Mapping[str, Any], keys: Sequence[str]) -> Any:
+    """Return what stands under the first of some keys, in capitals or not; None where none is there."""
+    held = {key.lower(): value for key, value in structure.items()}
+    return next((held[key] for key in keys if key in held), None)
+
+
 def _leaf(value: Any) -> tuple[Any, str]:
     """Return the samples of a column and its unit where a structure holds just these; else the value itself."""
     if not isinstance(value, Mapping):
         return value, ""
-    keys = {key.lower(): key for key in value}
-    unit = next((value[keys[key]] for key in _UNITS if key in keys), None)
-    samples = next((value[keys[key]] for key in _VALUES if key in keys), None)
+    unit, samples = _under(value, _UNITS), _under(value, _VALUES)
     return (samples, unit) if isinstance(unit, str) and samples is not None else (value, "")
 
 

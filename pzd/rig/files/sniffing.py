@@ -264,7 +264,12 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str | None] | 
     if len(units) > 1:
         return f"(?P<{name}>{number}{blank}(?:{'|'.join(units)}))(?![A-Za-z])", ""
     unit = units[0]
-    return f"(?P<{name}>{number}){blank}{unit}(?![A-Za-z])", {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+    return f"(?P<{name}>{number}){blank}{unit}(?![A-Za-z])", _spelled_unit(unit)
+
+
+def _spelled_unit(unit: str) -> str:
+    """Return the unit of a value in a name as pint spells it."""
+    return {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
 
 
 def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
@@ -277,12 +282,12 @@ def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None
     if not all(matches) or len(units) != 1:
         return None
     unit = units.pop()
-    spelled_unit = None if unit is None else {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
-    return f"(?<![A-Za-z]){word}(?P<{name}>{number}){unit or ''}(?![A-Za-z0-9])", spelled_unit
+    told = None if unit is None else _spelled_unit(unit)
+    return f"(?<![A-Za-z]){word}(?P<{name}>{number}){unit or ''}(?![A-Za-z0-9])", told
 
 
 _SAID = re.compile(
-    r"""[^\w\n]*(?P<label>[^\d\W][^:=;,\t\n]*?)[\s."']*[:=;,\t][^\w\n+-]*
+    r"""[^\w\n]*(?P<label>[^\d\W][^:\uff1a=;,\t\n]*?)[\s."']*[:\uff1a=;,\t][^\w\n+-]*
     (?P<number>[-+]?\d+(?:[.,]\d+)?)[^\w\n%\u00b0]*(?P<unit>[A-Za-z%\u00b0\u00b5]{1,5})?\W*""",
     re.VERBOSE,
 )

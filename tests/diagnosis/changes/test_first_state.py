@@ -153,6 +153,19 @@ def test_a_smaller_damping_at_one_level_may_be_a_valve_that_opens_at_the_yield(r
     assert {"C", "relief_valve"} <= names_told(changes)
 
 
+def test_a_fit_that_is_known_is_of_the_change_that_is_asked_about_last(rng: np.random.Generator) -> None:
+    """Whether it is large enough is asked of the last one, in whatever order both were first fitted."""
+    damper = drawn_damper(rng, (0.0,))
+    search = findings(rng, damper, damper.with_effect("gas_spring", {"k_g": 3000.0})).search
+    nothing = search.nothing()
+    spring, damping = (next(c for c in search.candidates if c.name == name) for name in ("gas_spring", "C"))
+    first = search._fit((spring, damping), np.zeros(2), nothing.scatter)
+    again = search._fit((damping, spring), np.zeros(2), nothing.scatter)
+    assert (first.candidates, again.candidates) == ((spring, damping), (damping, spring))
+    assert again.values.tolist() == first.values[::-1].tolist()
+    assert again.bic == first.bic
+
+
 @pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
 def test_a_force_without_a_name_moves_two_coordinates_as_far_as_they_are_told_apart(correlation: float) -> None:
     """Equation: 1/sqrt(1 - r^2) of two with correlation r."""
