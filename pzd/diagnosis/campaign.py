@@ -18,13 +18,15 @@ from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
-from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force, weighted_record
+from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force, weighed_by_noise, with_nuisances
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
+from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
+from pzd.fit.spread import estimated_spread
 from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.measures import criterion, criterion_error
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import NO_NUISANCE, NuisanceConfig
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -106,6 +108,8 @@ class Evidence:
     """All samples seen."""
     halves: tuple[Problem, Problem]
     """Training samples, and those that choose."""
+    nuisance: NuisanceConfig
+    """Standard deviations of what differs from test to test, as these tests show them within their prior."""
 
     def gap(self, fitted: FitResult) -> float:
         """Compute the gap that a fit leaves over all samples seen, as a share of peak."""
@@ -152,33 +156,57 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     base_rows = [nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
     seen = records_in_use(campaign.seen)
     predicted = dict(zip(seen, campaign.predictions(damper, seen), strict=True))
-    made: dict[tuple[int, bytes], WeightedRecord | None] = {}
-
-    def observed(kept: Sequence[Mask]) -> tuple[WeightedRecord, ...]:
-        """Weigh the records; one that lies in one half is the same in the whole."""
-        keys = [(i, kept[i].tobytes()) for i in records_in_use(kept)]
-        for i, key in keys:
-            if (i, key) not in made:
-                made[i, key] = weighted_record(prepared[i], kept[i], base_rows[i], predicted[i], campaign.nuisance)
-        return tuple(found for key in keys if (found := made[key]) is not None)
-
-    whole = observed(campaign.seen)
+    weighed = {i: weighed_by_noise(prepared[i], campaign.seen[i], base_rows[i], predicted[i]) for i in seen}
+    by_noise = [found for found in weighed.values() if found is not None]
     reference = damper.reference_temperature_degC
     if reference is None:
         recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
         reference = float(np.median(recorded)) if recorded else None
     problem = Problem(
-        whole,
+        tuple(by_noise),
         damper.base,
-        _scales(whole, prepared, damper),
+        _scales(by_noise, prepared, damper),
         reference,
         frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values),
         campaign.budget,
     )
-    training, validation = (observed(campaign.in_role(role)) for role in (TRAINING, VALIDATION))
-    return Evidence(
-        campaign, problem, (replace(problem, observations=training), replace(problem, observations=validation))
-    )
+    nuisance = _shown_by_tests(problem, damper, campaign.nuisance)
+    made: dict[tuple[int, bytes], WeightedRecord | None] = {}
+
+    def observed(kept: Sequence[Mask]) -> tuple[WeightedRecord, ...]:
+        """Integrate out what is each test's own; a record that lies in one half is the same in the whole."""
+        keys = [(i, kept[i].tobytes()) for i in records_in_use(kept)]
+        for i, key in keys:
+            if (i, key) not in made:
+                whole = np.array_equal(kept[i], campaign.seen[i])
+                bare = weighed[i] if whole else weighed_by_noise(prepared[i], kept[i], base_rows[i], predicted[i])
+                made[i, key] = None if bare is None else with_nuisances(bare, damper, nuisance)
+        return tuple(found for key in keys if (found := made[key]) is not None)
+
+    whole, *halves = (observed(kept) for kept in (campaign.seen, *map(campaign.in_role, (TRAINING, VALIDATION))))
+    training, validation = (replace(problem, observations=half) for half in halves)
+    return Evidence(campaign, replace(problem, observations=whole), (training, validation), nuisance)
+
+
+def _shown_by_tests(problem: Problem, damper: Damper, prior: NuisanceConfig) -> NuisanceConfig:
+    """Estimate within their prior the standard deviations of what differs from test to test.
+
+    Parameters
+    ----------
+    problem : the tests, weighed by noise alone
+    damper : what it leaves of them shows how they differ, T0, C, k and its effects free
+    prior : the standard deviations beforehand, which are the largest
+    """
+    if not problem.observations or prior == NO_NUISANCE:
+        return prior
+    tests = tuple(with_nuisances(o, damper, NO_NUISANCE) for o in problem.observations)
+    unknowns, start = problem.unknowns(tuple(damper.effects)), problem.start_with(damper)
+    anywhere = np.full(start.size, -np.inf), np.full(start.size, np.inf)
+    found = linearise(replace(problem, observations=tests), unknowns, start, anywhere)
+    own = [o.own_of_test(force, prior) for o, force in zip(tests, found.simulated, strict=True)]
+    slopes = np.split(found.jacobian.dense(), np.cumsum([r.size for r in found.residuals])[:-1])
+    offset, gain, delay = estimated_spread(own, slopes, found.residuals).tolist()
+    return NuisanceConfig(offset=offset * prior.offset, gain=gain * prior.gain, delay_s=delay * prior.delay_s)
 
 
 def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecord], damper: Damper) -> Scales:

@@ -35,7 +35,7 @@ from pzd.fit.cross_validation import (
 )
 from pzd.record import Array, Mask
 from pzd.signals.measures import rms
-from pzd.signals.nuisance import NuisanceConfig, nuisance_columns, nuisance_forces
+from pzd.signals.nuisance import NO_NUISANCE, NuisanceConfig, nuisance_columns, nuisance_forces
 
 # --- Folds: each test is held out once
 
@@ -403,10 +403,10 @@ class CrossValidation(Folds):
         return float(beyond @ beyond)
 
     def _refit_by_likelihood(self, damper: Damper) -> _Refit:
-        problem = evidence_of(self.campaign, damper).whole
+        evidence = evidence_of(self.campaign, damper)
 
         def without(held_out: Sequence[Mask]) -> Damper | None:
-            reduced = _reduced_problem(self.campaign, problem, damper, held_out)
+            reduced = _reduced_problem(self.campaign, evidence.whole, damper, held_out, evidence.nuisance)
             found = _refitted(reduced, damper)
             if reduced is None or found is None:
                 return found
@@ -421,7 +421,7 @@ class CrossValidation(Folds):
 
     def _criterion_problem(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
         """Return the problem of criterion (4) as a function of the held-out samples."""
-        campaign = replace(self.campaign, nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
+        campaign = replace(self.campaign, nuisance=NO_NUISANCE)
         labels = tuple((row.voltage_V, row.temperature_degC) for row in damper.base)
         if labels not in self._problems:
             self._problems[labels] = evidence_of(campaign, damper).whole
@@ -431,7 +431,7 @@ class CrossValidation(Folds):
             peaks[o.base_row] = max(peaks[o.base_row], o.peak)
 
         def without(held_out: Sequence[Mask]) -> Problem | None:
-            found = _reduced_problem(campaign, problem, damper, held_out)
+            found = _reduced_problem(campaign, problem, damper, held_out, NO_NUISANCE)
             if found is None:
                 return None
             pairs = zip(campaign.prepared, held_out, strict=True)
@@ -442,7 +442,9 @@ class CrossValidation(Folds):
         return without
 
 
-def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_out: Sequence[Mask]) -> Problem | None:
+def _reduced_problem(
+    campaign: Campaign, problem: Problem, damper: Damper, held_out: Sequence[Mask], nuisance: NuisanceConfig
+) -> Problem | None:
     """Return the problem without the held-out samples; None where nothing is left."""
     known = {o.name: o for o in problem.observations}
     kept = []
@@ -452,7 +454,7 @@ def _reduced_problem(campaign: Campaign, problem: Problem, damper: Damper, held_
             continue
         if mask.any():
             (given,) = campaign.predictions(damper, [i])
-            part = weighted_record(p, ~mask, part.base_row, given, campaign.nuisance)
+            part = weighted_record(p, ~mask, part.base_row, given, nuisance)
         if part is not None:
             kept.append(part)
     return replace(problem, observations=tuple(kept)) if kept else None

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pzd.fit.intervals import UNINFORMATIVE, inverse_normal, student_quantile
+from pzd.fit.spread import PRIOR_WORTH
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
 from pzd.parallel.on_disk import beside, one_at_a_time
@@ -31,8 +32,6 @@ STRETCH_COUNT = (4, 24)
 """Fewest and most stretches of one record."""
 LEVERAGE_FLOOR = 1e-3
 """Least share of the residual that leverage leaves: a parameter that depends on one stretch alone leaves none there."""
-PRIOR_WORTH = 4.0
-"""Weight of the prior variances of the sensors against the disagreement of the tests, in degrees of freedom."""
 HIDDEN_FORCE = 5e-4
 """Largest residual of a hidden law that no test shows, r.m.s. as a share of peak: a tenth of the error of a load cell
 of class 0.5, and less than a few cycles show under 1 % of noise."""

@@ -20,7 +20,10 @@ larger one is a gap of the model. What all tests share shows in the fits, whatev
 
 
 class NuisanceConfig(Frozen):
-    """Standard deviations of what differs from test to test without being an effect; the means are zero."""
+    """Standard deviations of what differs from test to test without being an effect; the means are zero.
+
+    They are those of any stand: what the tests of this one show is estimated within them, see `pzd.fit.spread`.
+    """
 
     offset: float = Field(default=0.005, ge=0.0, le=0.5)
     """Offset of the force, as a share of the test's peak force."""
@@ -28,6 +31,10 @@ class NuisanceConfig(Frozen):
     """Delay of the force."""
     gain: float = Field(default=0.02, ge=0.0, le=0.5)
     """Gain of the force, as a share of it."""
+
+
+NO_NUISANCE = NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0)
+"""Nothing differs from test to test."""
 
 
 def nuisance_forces(

@@ -108,13 +108,14 @@ FOUR = tuple((U, f, x) for U in (0.0, 150.0) for f, x in ((1.0, 0.015), (2.5, 0.
 def test_a_common_delay_is_known_no_better_than_the_delays_of_the_tests_let_it(
     tau: float, rng: np.random.Generator
 ) -> None:
-    # Each test has a delay of its own, sd 0.5 ms, and nothing else tells a common one from those.
+    # Each test has a delay of its own, sd 0.5 ms, and nothing else tells a common one from those: four that agree show
+    # hardly that the stand is better than that.
     effects = {"sensor_delay": {"tau": tau}}
     evidence, found = fitted_to(tuple(shown_late(0.0, effects, test, rng) for test in FOUR), effects)
     count = len(evidence.whole.observations)
     assert found.damper.effects["sensor_delay"]["tau"] == pytest.approx(tau, abs=DELAY / np.sqrt(count))
     by_the_tests = DELAY / np.sqrt(count)
-    assert 0.97 * by_the_tests < standard_errors(found)[0] < 1.2 * by_the_tests
+    assert 0.75 * by_the_tests < standard_errors(found)[0] < 1.2 * by_the_tests
 
 
 def test_t0_c_and_k_beside_an_effect_have_intervals_that_hold_them(rng: np.random.Generator) -> None:

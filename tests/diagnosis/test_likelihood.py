@@ -87,7 +87,7 @@ def test_a_delay_of_all_tests_and_one_of_a_test_shift_the_force_in_one(rng: np.r
     records = tuple(sine(stiff, 0.0, f, 0.0275, rng, noise=0.002, colour=0.0, rate=500.0) for f in (0.5, 1.0, 4.0))
     for o in evidence(records, stiff).whole.observations:
         force, nothing = prompt_force(o, stiff)[0], np.zeros((o.motion.time.size, 0))
-        for tau in (-1.3e-3, -0.4e-3, 0.9e-3):
+        for tau in np.array([-2.6, -0.8, 1.8]) * o.delay_s:
             sensors = {"sensor_delay": {"tau": tau}}
             own = o.likeliest_delay(o.delayed(force, sensors))
             left = o.standardised((o.measured - o.delayed(force)(tau + own))[:, np.newaxis])

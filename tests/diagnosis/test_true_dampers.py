@@ -109,9 +109,10 @@ def test_a_late_test_of_a_rigid_damper_is_found_over_the_whole_range() -> None:
     for observation in found.evidence.whole.observations:
         at = observation.delayed(shown_force(observation, found.damper))
         delays = np.linspace(-1.5e-3, 1.5e-3, 121)
-        left = observation.standardised(np.column_stack([observation.measured - at(d) for d in delays]))
-        best = delays[np.argmin(np.sum(left**2, axis=0) + (delays / observation.delay_s) ** 2)]
-        assert observation.likeliest_delay(at) == pytest.approx(best, abs=1e-4)
+        tried = np.append(delays, observation.likeliest_delay(at))
+        left = observation.standardised(np.column_stack([observation.measured - at(d) for d in tried]))
+        *others, found_there = np.sum(left**2, axis=0) + (tried / observation.delay_s) ** 2
+        assert found_there < min(others) + 0.5
 
 
 def test_tests_that_the_steps_of_a_channel_misread_alike_know_no_more_than_one() -> None:

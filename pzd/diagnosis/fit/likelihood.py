@@ -33,7 +33,7 @@ from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps
 from pzd.signals.lack_of_fit import fit_smooth_residual
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, PureError, pure_error
-from pzd.signals.nuisance import DELAYS_TRIED, NuisanceConfig
+from pzd.signals.nuisance import DELAYS_TRIED, NuisanceConfig, nuisance_columns
 from pzd.signals.splines import cubic, even_cubic, with_ringing
 
 # --- Nuisances
@@ -173,6 +173,8 @@ class WeightedRecord:
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
     nuisances: MarginalisedNuisances
     """Offset and gain of the test, and its jumps."""
+    timing: Array | None = None
+    """(n, 1) force by one standard deviation of the instant of the voltage [N]; None where it does not move."""
     delay_s: float = 0.0
     """Standard deviation of the delay of the test [s]; 0 where it has none."""
     first_delay: float = 0.0
@@ -243,6 +245,12 @@ class WeightedRecord:
     def standardised(self, values: Array) -> Array:
         """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
         return self.nuisances.marginalised(self._scaled(values))
+
+    def own_of_test(self, predicted: Array, nuisance: NuisanceConfig) -> Array:
+        """Return (w, 3) residuals by one standard deviation of offset, gain and delay, along a predicted force (n,)."""
+        moments = self.motion.time[self.sample_indices]
+        rate = (moments.size - 1) / float(moments[-1] - moments[0])
+        return self.standardised(nuisance_columns(predicted, rate, nuisance, self.compared))
 
     def single_samples(self, sizes: Array) -> Array | csr_array:
         """Return (w, j) in units of noise, one column for each of the (n,) sizes at the compared samples [N] but 0.
@@ -415,9 +423,17 @@ def weighted_record(
     given : predicted force, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
+    bare = weighed_by_noise(p, mask, base_row, given)
+    return None if bare is None else with_nuisances(bare, given.damper, nuisance)
+
+
+def weighed_by_noise(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
+) -> WeightedRecord | None:
+    """Weigh some samples of a record by noise alone, no nuisance integrated out; see `weighted_record`."""
     if not enough_samples(p, mask):
         return None
-    return (_from_cycles if _is_averaged(p) else _from_samples)(p, mask, base_row, given, nuisance)
+    return (_from_cycles if _is_averaged(p) else _from_samples)(p, mask, base_row, given)
 
 
 def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
@@ -439,7 +455,7 @@ def _is_averaged(p: PreparedRecord) -> bool:
 
 
 def _from_cycles(
-    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
 ) -> WeightedRecord | None:
     run = p.cycles
     if run is None:
@@ -462,7 +478,7 @@ def _from_cycles(
     halves = int(np.clip(np.ceil(-np.log(FORGOTTEN) * slowest / (0.5 * run.period)), 1, MOST_LEAD))
     channels = [_resampled(channel, points) for channel in p.mean_motion]
     motion, lead, factor = _cycle_motion(record, run.period, channels, halves)
-    bare = WeightedRecord(
+    return WeightedRecord(
         record.name,
         base_row,
         motion,
@@ -475,7 +491,6 @@ def _from_cycles(
         weights,
         MarginalisedNuisances.none(2 * weights.size - 1),
     )
-    return with_nuisances(bare, given.damper, nuisance)
 
 
 def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
@@ -520,9 +535,7 @@ def _resampled(cycle: Array, points: int) -> Array:
     return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
 
 
-def _from_samples(
-    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
-) -> WeightedRecord:
+def _from_samples(p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce) -> WeightedRecord:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
     first, *_, last = np.flatnonzero(mask)
@@ -542,7 +555,7 @@ def _from_samples(
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
     motion, places = simulation_motion(record)
     rows = int(np.count_nonzero(has_predecessors(compared, noise.coefficients.size)))
-    bare = WeightedRecord(
+    return WeightedRecord(
         record.name,
         base_row,
         motion,
@@ -554,8 +567,8 @@ def _from_samples(
         noise,
         np.zeros(0),
         MarginalisedNuisances.none(rows),
+        given.timing[mask],
     )
-    return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
 
 def _samples_per_harmonic(record: Record) -> float:
@@ -567,9 +580,7 @@ def _samples_per_harmonic(record: Record) -> float:
     return max(record.time.size / (2.0 * MOST_HARMONICS * cycles), 1.0)
 
 
-def with_nuisances(
-    bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
-) -> WeightedRecord:
+def with_nuisances(bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig) -> WeightedRecord:
     """Integrate out the test's own offset and gain, jumps and instants of the voltage, and find its likeliest delay.
 
     Cycles are folded by splines and a delayed force is read from one, which ring beside jumps: that is left out too.
@@ -583,7 +594,7 @@ def with_nuisances(
         force = delayed(found.first_delay)
         bends = jumps(bare.measured, closed=True) if averaged else jumps_in_samples(bare.measured, force)
         columns = [np.full(force.size, nuisance.offset * bare.peak), nuisance.gain * force]
-        whole = bare.standardised(np.column_stack([*columns, *([] if timing is None else [timing])]))
+        whole = bare.standardised(np.column_stack([*columns, *([] if bare.timing is None else [bare.timing])]))
         beside = bare.single_samples(with_ringing(np.maximum(bends, turns), closed=averaged))
         found = replace(found, nuisances=MarginalisedNuisances.from_columns(whole, beside))
         if nuisance.delay_s > 0.0:
