@@ -403,7 +403,7 @@ class CrossValidation(Folds):
         return float(beyond @ beyond)
 
     def _refit_by_likelihood(self, damper: Damper) -> _Refit:
-        evidence = evidence_of(self.campaign, damper)
+        evidence, plain = evidence_of(self.campaign, damper), self._refit_by_criterion(self.baseline)
 
         def without(held_out: Sequence[Mask]) -> Damper | None:
             reduced = _reduced_problem(self.campaign, evidence.whole, damper, held_out, evidence.nuisance)
@@ -411,6 +411,8 @@ class CrossValidation(Folds):
             if reduced is None or found is None:
                 return found
             fewer = damper.without_effects(*_not_shown(reduced, found))
+            if damper.effects and not fewer.effects:
+                return plain(held_out)  # what identify would hand on: no other weights may make it better or worse
             return found if len(fewer.effects) == len(damper.effects) else _refitted(reduced, fewer)
 
         return without
