@@ -44,6 +44,10 @@ STUCK_MISFIT = 1.0
 
 Reason: at its optimum a model is never worse than one that it contains; one square of noise is far below what
 `adopt_bic` asks for."""
+COMPLIANCES_TRIED = (1.0, 3.0, 5.0)
+"""Coordinates of 1/k [see `pzd.fit.element_coordinates`] from which a softer oil spring is searched.
+
+Reason: it gives by 1e-5, 1e-4 and 7e-4 of the stroke, a flank of less than a sample, of one or two, and of several."""
 SEARCH_LIMIT_MARGIN = 0.01
 """Distance from a limit within which a search variable counts as ending at it.
 

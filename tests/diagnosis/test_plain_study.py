@@ -38,3 +38,10 @@ def test_friction_and_damping_are_doubted_where_a_fit_from_the_truth_doubts_them
     rows = sum(len(o.rows) for o in outcomes)
     needless = [(o.case.number, o.needless) for o in outcomes if o.needless]
     assert sum(len(names) for _, names in needless) <= binom.ppf(1.0 - CHANCE, 2 * rows, 0.01), needless
+
+
+@pytest.mark.parametrize("number", [108, 168])
+def test_a_search_that_begins_with_a_rigid_oil_spring_does_not_end_there(number: int) -> None:
+    """A flank within a few samples is one more jump beside the delays of the tests; a gap of 0.5 to 3 % was left."""
+    found = judged(drawn(20261907, 300)[number], 20261907)
+    assert (found.kind, found.effects) == ("none", ()), found.reason

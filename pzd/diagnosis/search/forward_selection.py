@@ -185,14 +185,22 @@ class _ForwardSelection:
             self.current = fit(self.evidence.whole, (), self.evidence.whole.start())
 
     def choose_oil_spring(self) -> None:
-        """Take a gap for one only where rigid oil springs leave it too, if the tests do not tell them from these.
+        """Take a gap for one only where neither softer nor rigid oil springs close it.
 
-        Where friction turns within a sample or two its flank is left to chance, and any stiff spring fits as well; the
-        gap is asked of the flank.
+        A search that begins rigid may end there, for beside a delay of the test a flank within a few samples is one
+        more jump: softer springs are tried too. And where friction turns within a sample or two its flank is left to
+        chance, and any stiff spring fits as well: the gap is asked of the flank.
         """
         if not self.evidence.gap_is_significant(self.current, self.config):
             return
-        rigid = fit(replace(self.evidence.whole, rigid=True), (), self.current.optimum)
+        whole, elastic = self.evidence.whole, slice(2, 3 * len(self.evidence.whole.base), 3)
+        for compliance in thresholds.COMPLIANCES_TRIED:
+            begin = self.current.optimum.copy()
+            begin[elastic] = np.maximum(begin[elastic], compliance)
+            softer = fit(whole, (), begin)
+            if softer.misfit < self.current.misfit - thresholds.STUCK_MISFIT:
+                self.current = softer
+        rigid = fit(replace(whole, rigid=True), (), self.current.optimum)
         if rigid.misfit - self.current.misfit >= self.config.rival_bic:
             return
         if self.evidence.gap(rigid) < self.evidence.gap(self.current):
