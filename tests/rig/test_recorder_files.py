@@ -19,7 +19,7 @@ import yaml
 from pzd.config import load
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.rig.config import RigConfig
+from pzd.rig.config import FilesEntry, RigConfig
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import DataError
@@ -525,3 +525,23 @@ def test_an_empty_line_between_rows_without_a_clock_is_refused(tmp_path: Path) -
     (tmp_path / "a.csv").write_text("\n".join(text) + "\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"a\.csv:403: 1 fields where the header has 2"):
         read_as_guessed(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("between", [" ", "\t", ","])
+def test_the_rows_that_write_table_of_r_numbers_have_a_column_that_its_header_leaves_out(
+    tmp_path: Path, between: str
+) -> None:
+    rows = [f'"{n}"{between}{row}' for n, row in enumerate(table(TIME, MM, FORCE, by=between), start=1)]
+    head = between.join(f'"{name}"' for name in ("Time_s", "Stroke_mm", "Force_N"))
+    (tmp_path / "a.txt").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    (record,) = read_as_guessed(tmp_path / "a.txt")
+    assert record.time == pytest.approx(TIME, abs=1e-9)
+    assert record.displacement == pytest.approx(X, abs=1e-9)
+    assert record.force == pytest.approx(FORCE, abs=1e-5)
+
+
+def test_a_row_with_a_field_too_many_is_no_numbered_row(tmp_path: Path) -> None:
+    rows = [f"{n},{row}" for n, row in enumerate(table(TIME, MM, FORCE), start=7)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,displacement_mm,force_N", *rows]) + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"a\.csv:2: 4 fields where the header has 3"):
+        ingest(RigConfig(files=(FilesEntry(path="a.csv"),)), Control(), tmp_path)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from pzd.schema.errors import DataError, FilesError, at
@@ -119,3 +121,19 @@ def after_lines(text: str, count: int) -> int:
 def fields_of(line: str, separator: str) -> list[str]:
     """Split one line into its fields, stripped."""
     return line.split() if separator == BLANKS else [cell.strip() for cell in line.split(separator)]
+
+
+def unquoted_fields(line: str, separator: str) -> list[str]:
+    """Split one line into its fields, stripped, separators in quotes left alone."""
+    if separator == BLANKS:
+        line = " ".join(line.split())
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+ROW_NAMES = "row"
+"""Name of a first column of row numbers, which the header of R's `write.table` leaves out."""
+
+
+def number_rows(begin: Sequence[str]) -> bool:
+    """Whether the first cells of some rows, one behind the other, count them."""
+    return len(begin) > 1 and all(cell == str(n) for n, cell in enumerate(begin, start=1))

@@ -6,7 +6,6 @@ Only for the guess of a config, and for the few rows of a measured curve: a run 
 from __future__ import annotations
 
 import codecs
-import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -31,7 +30,17 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, plain_numbers, text_bytes, without_mark
+from pzd.rig.files.dialect import (
+    BLANKS,
+    ROW_NAMES,
+    SEPARATORS,
+    fields_of,
+    number_rows,
+    plain_numbers,
+    text_bytes,
+    unquoted_fields,
+    without_mark,
+)
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
 from pzd.rig.files.one_clock import headers_together
@@ -530,9 +539,7 @@ def _names_apart(lines: Sequence[str], encoding: str) -> Dialect | None:
 
 def _fields(line: str, separator: str) -> list[str]:
     """Split a line into its fields, separators in quotes left alone."""
-    if '"' not in line or separator == BLANKS:
-        return fields_of(line, separator)
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    return unquoted_fields(line, separator) if '"' in line else fields_of(line, separator)
 
 
 def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
@@ -595,6 +602,8 @@ def _table(
     if width == len(rows[first - 1]) + 1 and not any(rows[n][-1] for n in data if len(rows[n]) == width):
         width -= 1  # a separator behind the last field
         rows = [row[:width] for row in rows]
+    elif width == len(rows[first - 1]) + 1 and number_rows([rows[n][0] for n in data]):
+        rows = [[ROW_NAMES, *row] if n < first else row for n, row in enumerate(rows)]
     below = rows[first - 1]
     units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])
     units = (

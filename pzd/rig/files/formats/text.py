@@ -21,7 +21,17 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, after_lines, fields_of, plain_numbers, text_of
+from pzd.rig.files.dialect import (
+    BLANKS,
+    ROW_NAMES,
+    SEPARATORS,
+    after_lines,
+    fields_of,
+    number_rows,
+    plain_numbers,
+    text_of,
+    unquoted_fields,
+)
 from pzd.rig.files.sheet import (
     MOST_BELOW,
     MOST_FAULTS,
@@ -85,7 +95,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     ------
     DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
     """
-    lines = _lines_of(path, entry, wanted)
+    lines = _with_row_names(_lines_of(path, entry, wanted))
     heads, body, numbers = lines.heads, lines.body, lines.numbers
     header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
     header_line = None
@@ -172,10 +182,7 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     blocks: list[str] = []
     block: list[str] = []
     for number, line in chain([first] if first else [], numbered):
-        if separator == BLANKS:
-            row = line.split()
-        else:
-            row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        row = unquoted_fields(line, separator)
         if len(heads) < above:
             heads.append([cell.strip() for cell in row])
             continue
@@ -224,6 +231,21 @@ def _field_counts(body: str, separator: str) -> NDArray[np.int64]:
     before = np.searchsorted(np.flatnonzero(codes == ord(separator)), ends)
     result: NDArray[np.int64] = np.diff(np.concatenate(([0], before))) + 1
     return result
+
+
+_ROWS_READ = 16
+"""Rows whose first cells tell whether they are numbers of the rows."""
+
+
+def _with_row_names(lines: _Lines) -> _Lines:
+    """Name the first column where the header leaves it out and it holds the numbers of the rows."""
+    width, first = len(lines.heads[0]) if lines.heads else 0, lines.fields[:_ROWS_READ]
+    if not width or np.any(first != width + 1):
+        return lines
+    rows = [fields_of(line, lines.separator) for line in lines.body.split("\n", _ROWS_READ)[: first.size]]
+    if not number_rows([row[0] for row in rows]) or not all(row[-1] for row in rows):
+        return lines
+    return replace(lines, heads=[[ROW_NAMES, *head] for head in lines.heads])
 
 
 def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_]]:
