@@ -59,6 +59,12 @@ Need = Literal["voltage", "temperature"]
 """What must vary inside a test."""
 
 
+FLOWING_WELL = (0.1, 0.9)
+"""Shares of the way from T0 to the largest force of a condition between which a change of the flow shows well.
+
+Reason: nearer to either end it acts on nearly all of the flow or on next to nothing. Not tuned."""
+
+
 @dataclass(frozen=True)
 class Scales:
     """Magnitudes of the signals of one rig, in which starting values of parameters are given."""
@@ -77,6 +83,8 @@ class Scales:
     """Median C of the conditions [N s/m]."""
     voltage: float
     """Span of the control signal [V]."""
+    flow: tuple[tuple[float, float], ...] = ()
+    """T0 and the force at the largest speed of each condition [N]: between them its fluid flows."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +99,27 @@ class Search:
     """Whether steps are ratios."""
     within: tuple[float, float] = (-math.inf, math.inf)
     """Smallest and largest value searched, in that scale."""
+    flowing: bool = False
+    """Whether it is a force at which the flow changes: it shows between T0 and the largest force of a condition alone,
+    so that each needs a start there."""
+
+    def starts_on(self, scales: Scales) -> tuple[float, ...]:
+        """Return the starting values in scale on a rig of those magnitudes.
+
+        Examples
+        --------
+        >>> scales = Scales(1500.0, 300.0, 0.1, 0.02, 1.0, 1000.0, 2.0, flow=((280.0, 410.0), (960.0, 1110.0)))
+        >>> Search(lambda s: s.force, (0.25, 0.8), flowing=True).starts_on(scales)
+        (0.25, 0.8, 0.69)
+        """
+        if not self.flowing:
+            return self.starts
+        size, found = self.scale(scales) or 1.0, list(self.starts)
+        for friction, largest in scales.flow:
+            low, high = (friction + share * (largest - friction) for share in FLOWING_WELL)
+            if high > low and not any(low <= start * size <= high for start in found):
+                found.append(0.5 * (low + high) / size)
+        return tuple(found)
 
 
 Strength = Callable[[float], dict[str, float]]

@@ -225,7 +225,22 @@ def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecor
         largest(r.acceleration for r in records),
         max(float(np.median([row.C_Ns_per_m for row in damper.base])), UNSEEN[0] * max(peaks) / speed),
         voltage_scale(records),
+        flow_of(damper, prepared),
     )
+
+
+def flow_of(damper: Damper, prepared: Sequence[PreparedRecord]) -> tuple[tuple[float, float], ...]:
+    """Return T0 and the largest force [N] of each condition by the damper itself: noise adds to what is measured.
+
+    Equation: T0 + C max abs(v)
+    """
+    speeds: dict[int, float] = {}
+    for p in prepared:
+        if p.constant:
+            place = nearest_row(damper.base, p)
+            speeds[place] = max(speeds.get(place, 0.0), float(np.max(np.abs(p.record.velocity))))
+    rows = ((damper.base[place], speed) for place, speed in sorted(speeds.items()))
+    return tuple((row.T0_N, row.T0_N + row.C_Ns_per_m * speed) for row, speed in rows)
 
 
 def nearest_row(rows: Sequence[BaseRow], prepared: PreparedRecord) -> int:

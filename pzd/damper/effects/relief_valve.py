@@ -25,7 +25,7 @@ def _flatter(values: Mapping[str, float], damping: float) -> bool:
 
 
 # Close to 1 as well: where T0 is most of the force, no step leads on from a start below T0.
-_F_R_SEARCH = Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True)
+_F_R_SEARCH = Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True, flowing=True)
 
 EFFECT = Effect(
     name="relief_valve",

@@ -334,7 +334,8 @@ def _absent(first: FirstState, name: str) -> Candidate:
 
     def tried(p: Parameter) -> tuple[float, ...]:
         weak = (WEAK,) if unscaled and p.unit == "N s/m" else ()
-        return (*(_closer(p.search.starts) if several else p.search.starts), *weak, *faint)
+        starts = p.search.starts_on(first.scales)
+        return (*(_closer(starts) if several else starts), *weak, *faint)
 
     grid = itertools.product(*map(tried, known_effect(name).parameters))
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)

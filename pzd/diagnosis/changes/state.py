@@ -13,6 +13,7 @@ from pzd.damper.effect import Scales
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, Effects
 from pzd.diagnosis import data
+from pzd.diagnosis.campaign import flow_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.config import IdentifyConfig
@@ -68,6 +69,7 @@ class State:
             largest([float(np.max(np.abs(r.acceleration))) for r in self.records]),
             max(float(np.median([row.C_Ns_per_m for row in self.damper.base])), SOFTEST * largest(peaks) / speed),
             self.voltage_scale,
+            flow_of(self.damper, self.prepared),
         )
 
 

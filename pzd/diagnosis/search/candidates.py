@@ -100,7 +100,7 @@ def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array
             start *= problem.relative_friction(unknown.node)
         return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
 
-    grid = itertools.product(*(parameter.search.starts for parameter in parameters.values()))
+    grid = itertools.product(*(parameter.search.starts_on(problem.scales) for parameter in parameters.values()))
     starts = [dict(zip(parameters, values, strict=True)) for values in grid]
     return [np.array([searched(u, start[u.parameter.name]) for u in unknowns]) for start in starts]
 

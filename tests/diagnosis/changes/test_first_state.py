@@ -141,6 +141,20 @@ def test_a_valve_that_opens_just_above_the_yield_at_one_level_is_found_and_no_sm
         assert opens.to == pytest.approx(0.62 * FORCE, rel=0.02)
 
 
+def test_a_valve_that_acts_at_the_middle_level_of_three_is_no_smaller_damping(rng: np.random.Generator) -> None:
+    """At the lowest it stays shut, at the highest it is open from the yield on: a start is needed at each of them."""
+    rows = [
+        BaseRow(voltage_V=volts, T0_N=share * FORCE, C_Ns_per_m=0.1 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
+        for volts, share in ((0.0, 0.17), (100.0, 0.585), (200.0, 0.84))
+    ]
+    damper = Damper(base=tuple(rows))
+    opened = damper.with_effect("relief_valve", {"F_r": 0.64 * FORCE, "C_r": 0.02 * FORCE / SPEED})
+    changes = found(campaign(damper, rng), campaign(opened, rng))
+    assert names(changes) == ["relief_valve"]
+    opens = next(c for c in changes.changes if c.parameter == "F_r")
+    assert opens.to == pytest.approx(0.64 * FORCE, rel=0.02)
+
+
 def test_a_smaller_damping_at_one_level_may_be_a_valve_that_opens_at_the_yield(rng: np.random.Generator) -> None:
     """At the other level, where it stays shut, C is the same."""
     rows = [
