@@ -11,7 +11,7 @@ its sensor. Noise of a constant voltage would look like steps of the voltage.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -179,17 +179,22 @@ def _with_lead(cleaned: Record, early: Array, motion: Motion) -> Record:
 
 
 def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, ...]:
-    """Return two cycles of the lead, and the same with other displacements that are as likely."""
-    draw = np.random.default_rng(DRAWS)
+    """Return two cycles of the lead, and the same with other displacements that are as likely.
+
+    At a corner the acceleration has as much beyond half the sampling rate as below. A force is recorded through a
+    filter, which lets nothing of it pass; sampled, it would fold into every harmonic.
+    """
+    draw, size = np.random.default_rng(DRAWS), average.clear_harmonics.size
     two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
 
-    def other() -> Callable[[Array], Motion]:
-        error = average.error(draw)
-        error[: average.clear_harmonics.size] += average.clear_harmonics
-        return average.motion(error, POINTS_OF_DRAW)
+    def other() -> Record:
+        drawn = average.error(draw)
+        drawn[:size] += average.clear_harmonics
+        x, v, _ = average.motion(drawn, POINTS_OF_DRAW)(two.time)
+        *_, a = average.motion(drawn[:size], POINTS_OF_DRAW)(two.time)
+        return _with_motion(two, (x, v, a))
 
-    motions = [other() for _ in range(DRAWS)]
-    return (two, *(_with_motion(two, motion(two.time)) for motion in motions))
+    return (two, *(other() for _ in range(DRAWS)))
 
 
 def _smoothed_displacement(record: Record) -> tuple[Record, tuple[Record, ...]]:

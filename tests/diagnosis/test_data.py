@@ -73,6 +73,19 @@ def test_the_force_reverses_at_the_corners_of_a_triangle(rng: np.random.Generato
     assert np.std(missed) < 2.0  # 3.2 where only harmonics of the whole cycle are kept
 
 
+def test_what_the_acceleration_has_beyond_the_sampling_rate_does_not_fold_into_its_harmonics(
+    rng: np.random.Generator,
+) -> None:
+    # Of the inertia of a rod: at a corner it has as much at every order, and the noise of a triangle was 90 times that.
+    (prepared,) = prepare((triangle(1e-6, rng)[0],))
+    known, *others = prepared.draws
+    points = known.time.size // 2
+    odd = np.arange(1, 40, 2)
+    own, *drawn = (np.fft.rfft(each.acceleration[points:])[odd] / points for each in (known, *others))
+    error = np.sqrt(np.mean(np.abs(np.array(drawn) - own) ** 2, axis=0))
+    assert np.all(error < 0.01 * np.abs(own))
+
+
 def test_a_triangle_without_noise_is_predicted_exactly(rng: np.random.Generator) -> None:
     record, force = triangle(1e-9, rng)
     (prepared,) = prepare((record,))
