@@ -215,10 +215,11 @@ class Search:
         ]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
-    def _additions(self, before: Fitted, *, possible: bool = False) -> list[Fitted]:
+    def _additions(self, before: Fitted, *, possible: bool = False, opposed: bool = False) -> list[Fitted]:
         """Return the fits with one more change that is physical and large enough to adopt, the best first.
 
-        Where it need only be possible it may be smaller.
+        Where it need only be `possible` it may be smaller; one that another one will oppose may leave more than its
+        absence.
         """
         least = self._possible if possible else self.adoptable
         promising = self._promising(before, self._tried(before), before.scatter)
@@ -229,7 +230,7 @@ class Search:
         ]
         # What visibly leaves more than its absence, the tests taken to differ alike, does not explain it.
         tried = (self._with(before, p) for p in worth)
-        fits = [f for f in tried if self._admissible(f, least(f)) and self._leaves_less(f, before)]
+        fits = [f for f in tried if self._admissible(f, least(f)) and (opposed or self._leaves_less(f, before))]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
@@ -284,10 +285,20 @@ class Search:
         return min(enough or [nothing, *ends], key=lambda f: (len(f.candidates) if enough else 0, f.bic))
 
     def _beginnings(self, nothing: Fitted) -> list[Fitted]:
-        """Return the best first changes; one alone where it leaves nothing visible."""
+        """Return the best first changes; one alone where it leaves nothing visible, two where none alone begins."""
         found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
         enough = [f for f in found if self.leaves_nothing(f)]
-        return enough[:1] or found[:BEAM]
+        return enough[:1] or found[:BEAM] or self._opposed(nothing)
+
+    def _opposed(self, nothing: Fitted) -> list[Fitted]:
+        """Return the best two changes that leave nothing visible, though either alone leaves more than neither.
+
+        More friction and less damping nearly cancel: by its course over the cycle the difference has both, and without
+        the other each makes it larger.
+        """
+        alone = [f for f in self._additions(nothing, opposed=True) if f.bic - nothing.bic <= self.adopt_bic]
+        both = [f for one in alone[:BEAM] for f in self._additions(one) if self.leaves_nothing(f)]
+        return sorted((f for f in both if f.bic - nothing.bic <= self.adopt_bic), key=lambda f: f.bic)[:BEAM]
 
     def leaves_nothing(self, fitted: Fitted) -> bool:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
