@@ -20,6 +20,7 @@ from pzd.diagnosis.changes.candidates import (
     Response,
     candidates,
     element_of,
+    known_effect,
     known_parameter,
     nearest_node,
     parameter_value,
@@ -750,8 +751,12 @@ class Findings:
         ]  # fmt: skip
 
     def _unchanged(self, best: Fitted) -> tuple[Unchanged, ...]:
-        """List what would have shown a visible change, and has not changed visibly."""
+        """List what would have shown a visible change, and has not changed visibly.
+
+        No T0 that is not told from 0 where a branch holds the friction: none of the damper would seem to be there.
+        """
         known = Uncertainty(self.search, best)
+        branched = any(known_effect(name).place == "branch" for name in self.first.damper.effects)
         found: dict[tuple[str, str], Unchanged] = {}
         for candidate in filter(known.tells, self.search.candidates):
             if candidate.key[0] in found:
@@ -762,6 +767,8 @@ class Findings:
             if most > SHOWN or LEVEL * if_changed.alone > most or abs(if_changed.value) > most:
                 continue
             at, start, to, low, high = self._values([(c, if_changed.value, if_changed.error)])
+            if branched and c.name == "T0" and any(not end for end in (low if isinstance(low, tuple) else (low,))):
+                continue
             found[candidate.key[0]] = Unchanged(
                 name=c.name, parameter=c.parameter, unit=self.control.own_unit(c.unit), from_=start, to=to,
                 low95=low, high95=high, at_voltage_V=at,
