@@ -278,17 +278,22 @@ class Search:
         """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end.
 
         Of ends that leave nothing visible that with the fewest changes is the best: more of them may stand in for one.
+        Where none does, two changes that oppose each other may.
         """
         nothing = self.nothing()
-        ends = [self._without_superfluous(self._continued(self._exchanged(f))) for f in self._beginnings(nothing)]
-        enough = [f for f in ends if f.candidates and self.leaves_nothing(f)]
+        ends, enough = list[Fitted](), list[Fitted]()
+        for beginnings in (self._beginnings, self._opposed):
+            ends += [self._without_superfluous(self._continued(self._exchanged(f))) for f in beginnings(nothing)]
+            enough = [f for f in ends if f.candidates and self.leaves_nothing(f)]
+            if enough or self.leaves_nothing(nothing):
+                break
         return min(enough or [nothing, *ends], key=lambda f: (len(f.candidates) if enough else 0, f.bic))
 
     def _beginnings(self, nothing: Fitted) -> list[Fitted]:
-        """Return the best first changes; one alone where it leaves nothing visible, two where none alone begins."""
+        """Return the best first changes; one alone where it leaves nothing visible."""
         found = [f for f in self._additions(nothing) if f.bic - nothing.bic <= self.adopt_bic]
         enough = [f for f in found if self.leaves_nothing(f)]
-        return enough[:1] or found[:BEAM] or self._opposed(nothing)
+        return enough[:1] or found[:BEAM]
 
     def _opposed(self, nothing: Fitted) -> list[Fitted]:
         """Return the best two changes that leave nothing visible, though either alone leaves more than neither.
