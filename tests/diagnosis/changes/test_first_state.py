@@ -8,7 +8,20 @@ from typing import cast
 
 import numpy as np
 import pytest
-from states import FORCE, MOTIONS, SPEED, STROKE, campaign, drawn_damper, found, inside, names, names_told, state_of
+from states import (
+    FORCE,
+    MOTIONS,
+    SPEED,
+    STROKE,
+    campaign,
+    drawn_damper,
+    found,
+    inside,
+    names,
+    names_told,
+    scaled,
+    state_of,
+)
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
@@ -145,14 +158,28 @@ def test_a_valve_that_acts_at_the_middle_level_of_three_is_no_smaller_damping(rn
     """At the lowest it stays shut, at the highest it is open from the yield on: a start is needed at each of them."""
     rows = [
         BaseRow(voltage_V=volts, T0_N=share * FORCE, C_Ns_per_m=0.1 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
-        for volts, share in ((0.0, 0.17), (100.0, 0.585), (200.0, 0.84))
+        for volts, share in ((0.0, 0.17), (100.0, 0.52), (200.0, 0.84))
     ]
     damper = Damper(base=tuple(rows))
-    opened = damper.with_effect("relief_valve", {"F_r": 0.64 * FORCE, "C_r": 0.02 * FORCE / SPEED})
+    opened = damper.with_effect("relief_valve", {"F_r": 0.56 * FORCE, "C_r": 0.02 * FORCE / SPEED})
     changes = found(campaign(damper, rng), campaign(opened, rng))
     assert names(changes) == ["relief_valve"]
     opens = next(c for c in changes.changes if c.parameter == "F_r")
-    assert opens.to == pytest.approx(0.64 * FORCE, rel=0.02)
+    assert opens.to == pytest.approx(0.56 * FORCE, rel=0.02)
+
+
+@pytest.mark.parametrize(("friction", "damping"), [(1.15, 0.9), (1.2, 0.85), (0.85, 1.12)])
+def test_more_friction_and_less_damping_are_both_found_though_they_nearly_cancel(
+    friction: float, damping: float, rng: np.random.Generator
+) -> None:
+    """A seal that is worn in and an oil that is thinner: either alone leaves more than neither."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.4 * FORCE, C_Ns_per_m=0.6 * FORCE / SPEED, k_N_per_m=100.0 * FORCE / STROKE)
+    damper = Damper(base=(row,))
+    changes = found(campaign(damper, rng), campaign(scaled(damper, T0_N=friction, C_Ns_per_m=damping), rng))
+    assert sorted(names(changes)) == ["C", "T0"]
+    assert changes.verdict == "changed"
+    for change, factor in zip(sorted(changes.changes, key=lambda c: c.name), (damping, friction), strict=True):
+        assert change.to == pytest.approx(factor * change.from_, rel=0.03)
 
 
 def test_a_smaller_damping_at_one_level_may_be_a_valve_that_opens_at_the_yield(rng: np.random.Generator) -> None:
