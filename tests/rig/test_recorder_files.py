@@ -540,8 +540,10 @@ def test_the_rows_that_write_table_of_r_numbers_have_a_column_that_its_header_le
     assert record.force == pytest.approx(FORCE, abs=1e-5)
 
 
-def test_a_row_with_a_field_too_many_is_no_numbered_row(tmp_path: Path) -> None:
-    rows = [f"{n},{row}" for n, row in enumerate(table(TIME, MM, FORCE), start=7)]
-    (tmp_path / "a.csv").write_text("\n".join(["time_s,displacement_mm,force_N", *rows]) + "\n", encoding="utf-8")
+@pytest.mark.parametrize("header", ["n,time_s,displacement_mm", "time_s,displacement_mm,force_N"])
+def test_a_row_with_a_field_too_many_is_no_numbered_row(tmp_path: Path, header: str) -> None:
+    """Without quotes the first of its fields may be the one that the header names first, and the last have no name."""
+    rows = [f"{n},{row}" for n, row in enumerate(table(TIME, MM, FORCE), start=1)]
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"a\.csv:2: 4 fields where the header has 3"):
         ingest(RigConfig(files=(FilesEntry(path="a.csv"),)), Control(), tmp_path)

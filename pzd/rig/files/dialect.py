@@ -134,6 +134,9 @@ ROW_NAMES = "row"
 """Name of a first column of row numbers, which the header of R's `write.table` leaves out."""
 
 
-def number_rows(begin: Sequence[str]) -> bool:
-    """Whether the first cells of some rows, one behind the other, count them."""
-    return len(begin) > 1 and all(cell == str(n) for n, cell in enumerate(begin, start=1))
+def are_numbered(rows: Sequence[str]) -> bool:
+    """Whether some rows, one behind the other, begin with their number in quotes, as `write.table` of R writes them.
+
+    A number without quotes may be one of the columns that the header names, and the last one be without a name.
+    """
+    return len(rows) > 1 and all(row.lstrip().startswith(f'"{n}"') for n, row in enumerate(rows, start=1))

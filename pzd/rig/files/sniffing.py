@@ -34,8 +34,8 @@ from pzd.rig.files.dialect import (
     BLANKS,
     ROW_NAMES,
     SEPARATORS,
+    are_numbered,
     fields_of,
-    number_rows,
     plain_numbers,
     text_bytes,
     unquoted_fields,
@@ -491,7 +491,7 @@ def _sniffed_as(raw: bytes, encoding: str) -> Dialect | None:
     # In quotes a decimal comma may stand between separating ones.
     quoted = any('","' in line for line in lines)
     readings = [(s, d) for s in (*SEPARATORS, BLANKS) for d in ".," if s != d or quoted]
-    tables = [_table([_fields(line, reading[0]) for line in lines], encoding, *reading) for reading in readings]
+    tables = [_table([_fields(line, reading[0]) for line in lines], encoding, *reading, lines) for reading in readings]
     found = [table for table in tables if table is not None]
     best = max(found, key=lambda rated: rated[0])[1] if found else None
     if best is not None and _of_a_rig(best):
@@ -572,9 +572,9 @@ def _reads(raw: bytes, encoding: str) -> bool:
 
 
 def _table(
-    cells: list[list[str]], encoding: str, separator: str, decimal: str
+    cells: list[list[str]], encoding: str, separator: str, decimal: str, lines: Sequence[str] = ()
 ) -> tuple[tuple[int, int], Dialect] | None:
-    """Find the table in rows read this way, rated by its rows and then the numbers in them."""
+    """Find the table in rows read this way, from lines of a text, rated by its rows and then the numbers in them."""
     rows = [[_unquoted(cell) for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
     data = [n for n, row in enumerate(rows) if len(row) > 1 and _mostly_numbers(row, numbers[n])]
@@ -583,6 +583,7 @@ def _table(
     data = _of_the_table(rows, [n for n in data if len(rows[n]) >= usual], decimal)
     if not data:
         return None
+    numbered = bool(lines) and are_numbered([lines[n] for n in data])
     first = start = data[0]
     if first == 0:
         return _headless(rows, data, numbers, encoding, separator, decimal)
@@ -602,7 +603,7 @@ def _table(
     if width == len(rows[first - 1]) + 1 and not any(rows[n][-1] for n in data if len(rows[n]) == width):
         width -= 1  # a separator behind the last field
         rows = [row[:width] for row in rows]
-    elif width == len(rows[first - 1]) + 1 and number_rows([rows[n][0] for n in data]):
+    elif numbered and width == len(rows[first - 1]) + 1:
         rows = [[ROW_NAMES, *row] if n < first else row for n, row in enumerate(rows)]
     below = rows[first - 1]
     units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])

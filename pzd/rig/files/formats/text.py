@@ -26,8 +26,8 @@ from pzd.rig.files.dialect import (
     ROW_NAMES,
     SEPARATORS,
     after_lines,
+    are_numbered,
     fields_of,
-    number_rows,
     plain_numbers,
     text_of,
     unquoted_fields,
@@ -59,6 +59,8 @@ _UNQUOTED = "\x1f"
 """Separator of lines that were taken out of their quotes."""
 _AT_A_TIME, _CHARACTERS = 4096, 65536
 """Lines and characters that are held at a time as strings of a line or a cell, which take many times the file."""
+_ROWS_READ = 16
+"""Rows that tell whether each begins with its number."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
 _EMPTY_LINE = re.compile(r"\n[ \t]*\n")
@@ -95,7 +97,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     ------
     DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
     """
-    lines = _with_row_names(_lines_of(path, entry, wanted))
+    lines = _lines_of(path, entry, wanted)
     heads, body, numbers = lines.heads, lines.body, lines.numbers
     header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
     header_line = None
@@ -181,6 +183,7 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     numbers, fields = array("q"), array("q")  # a list of as many numbers takes five times the memory
     blocks: list[str] = []
     block: list[str] = []
+    first_rows: list[str] = []
     for number, line in chain([first] if first else [], numbered):
         row = unquoted_fields(line, separator)
         if len(heads) < above:
@@ -188,12 +191,16 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
             continue
         if not line.strip() and (not numbers or entry.rate_Hz is None):
             continue
+        if len(numbers) < _ROWS_READ:
+            first_rows.append(line)
         numbers.append(number)
         fields.append(len(row))
         block.append(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row))
         if len(block) == _AT_A_TIME:
             blocks.append("\n".join(block))
             block.clear()
+    if heads and fields and fields[0] == len(heads[0]) + 1 and are_numbered(first_rows):
+        heads = [[ROW_NAMES, *head] for head in heads]
     body = "\n".join([*blocks, "\n".join(block)] if block else blocks)
     return _Lines(heads, body, np.array(numbers, dtype=np.int64), np.array(fields, dtype=np.int64), _UNQUOTED)
 
@@ -231,21 +238,6 @@ def _field_counts(body: str, separator: str) -> NDArray[np.int64]:
     before = np.searchsorted(np.flatnonzero(codes == ord(separator)), ends)
     result: NDArray[np.int64] = np.diff(np.concatenate(([0], before))) + 1
     return result
-
-
-_ROWS_READ = 16
-"""Rows whose first cells tell whether they are numbers of the rows."""
-
-
-def _with_row_names(lines: _Lines) -> _Lines:
-    """Name the first column where the header leaves it out and it holds the numbers of the rows."""
-    width, first = len(lines.heads[0]) if lines.heads else 0, lines.fields[:_ROWS_READ]
-    if not width or np.any(first != width + 1):
-        return lines
-    rows = [fields_of(line, lines.separator) for line in lines.body.split("\n", _ROWS_READ)[: first.size]]
-    if not number_rows([row[0] for row in rows]) or not all(row[-1] for row in rows):
-        return lines
-    return replace(lines, heads=[[ROW_NAMES, *head] for head in lines.heads])
 
 
 def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_]]:
