@@ -205,7 +205,10 @@ def _shown_by_tests(problem: Problem, damper: Damper, prior: NuisanceConfig) -> 
     found = linearise(replace(problem, observations=tests), unknowns, start, anywhere)
     own = [o.own_of_test(force, prior) for o, force in zip(tests, found.simulated, strict=True)]
     slopes = np.split(found.jacobian.dense(), np.cumsum([r.size for r in found.residuals])[:-1])
-    offset, gain, delay = estimated_spread(own, slopes, found.residuals).tolist()
+    # A power law whose flow stands still at a sample has no slope there.
+    finite = np.all([np.all(np.isfinite(each), axis=0) for each in slopes], axis=0)
+    shared = [each[:, finite] for each in slopes]
+    offset, gain, delay = estimated_spread(own, shared, found.residuals).tolist()
     return NuisanceConfig(offset=offset * prior.offset, gain=gain * prior.gain, delay_s=delay * prior.delay_s)
 
 
