@@ -778,6 +778,31 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("effects", "rivals", "told"),
+    [
+        (("gas_spring",), ("fluid_inertia",), " that it is gas_spring or fluid_inertia"),
+        (("lash", "end_stop"), ("gas_spring",), " that it is lash and end_stop, or gas_spring"),
+        ((), ("lash",), " that it is nothing or lash"),
+        (("lash", "end_stop"), (), ""),
+    ],
+)
+def test_the_confidence_is_that_of_all_adopted_effects_together_or_of_a_rival(
+    effects: tuple[str, ...], rivals: tuple[str, ...], told: str
+) -> None:
+    changes = {"verdict": "ambiguous", "effects": effects, "rivals": rivals, "parameters": {}}
+    assert f"confidence: 97%{told}" in diagnosis_lines(diagnosis().model_copy(update=changes), Control())
+
+
+def test_intervals_beside_a_force_without_a_name_say_what_they_leave_out() -> None:
+    unexplained = diagnosis().model_copy(update={"verdict": "unexplained"})
+    told = [line for line in diagnosis_lines(unexplained, Control()) if line.startswith("intervals: ")]
+    assert told == [
+        "intervals: these count noise and how the tests differ; what has no name may move the values by more"
+    ]
+    assert not any(line.startswith("intervals: ") for line in diagnosis_lines(diagnosis(), Control()))
+
+
 def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
     """The effect that closes most comes first; one that is open, or closes nothing, is not listed."""
     shares = {"gas_spring": (0.09, "likely"), "rounded_yield": (0.61, "certain"), "lash": (0.3, "open")}

@@ -31,6 +31,8 @@ _DOUBTFUL = {
     "none": "nothing stands out of the noise, and these tests do not exclude that something is missing",
 }
 """The same where the confidence says so."""
+UNNAMED_FORCE = "count noise and how the tests differ; what has no name may move the values by more"
+"""What the intervals of adopted effects leave out where the verdict is `unexplained`."""
 _MOST = 3
 """How many regions and candidates are listed."""
 _MOST_SHAPES = 2
@@ -68,6 +70,8 @@ def diagnosis_lines(
         lines += _prediction(diagnosis.prediction, unit, every_test=every_test)
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
     lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
+    if diagnosis.effects and diagnosis.verdict == "unexplained":
+        lines.append(f"intervals: these {UNNAMED_FORCE}")
     if diagnosis.confidence is not None:
         lines.append(f"confidence: {diagnosis.confidence:.0%}{_open_names(diagnosis)}")
     if diagnosis.rivals:
@@ -105,11 +109,12 @@ def _confident(confidence: float | None) -> bool:
 
 
 def _open_names(diagnosis: Diagnosis) -> str:
-    """Return the effects that the confidence of an ambiguous verdict is about."""
-    if diagnosis.verdict != "ambiguous":
+    """Return the answers that the confidence of an ambiguous verdict is about: all that was adopted, or a rival."""
+    if diagnosis.verdict != "ambiguous" or not diagnosis.rivals:
         return ""
-    named = [*diagnosis.effects, *diagnosis.rivals] + ["nothing"] * (not diagnosis.effects)
-    return f" that it is {' or '.join(named)}" if len(named) > 1 else ""
+    together = " and ".join(diagnosis.effects) or "nothing"
+    comma = "," if len(diagnosis.effects) > 1 else ""
+    return f" that it is {together}{comma} or {' or '.join(diagnosis.rivals)}"
 
 
 def _gap(diagnosis: Diagnosis) -> str:

@@ -25,6 +25,7 @@ from pzd.report.blocks import (
 from pzd.report.columns import PAGE, Column, Quantity, Table
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words, effects_in_words
+from pzd.report.diagnosis_text import UNNAMED_FORCE
 
 MIDDLE_DIGITS = 6
 """Of the middle of a test: as it is given, for the amplitude about it leaves nothing of the recorded stroke."""
@@ -73,6 +74,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
         blocks.append(tables.effect_parameters(diagnosis, context.control).block())
+        if diagnosis.verdict == "unexplained":
+            blocks.append(Paragraph(f"The intervals {UNNAMED_FORCE}."))
     if diagnosis.prediction:
         blocks.append(tables.prediction(diagnosis.prediction, context.control).block())
     if diagnosis.ranking:
