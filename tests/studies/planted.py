@@ -19,6 +19,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def planted(records: Sequence[Record], name: str, values: Mapping[str, float]) -
     for r in records:
         motion = Motion(r.time, r.displacement, r.velocity, r.acceleration)
         added = respond(damper, motion, 0.0) - respond(nothing, motion, 0.0)
-        found.append(Record(**{**vars(r), "force": r.force + added}))
+        found.append(replace(r, force=r.force + added))
     return found
 
 

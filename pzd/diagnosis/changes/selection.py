@@ -243,11 +243,11 @@ class Search:
     def run(self) -> Fitted:
         """Return the changes that explain the difference.
 
-        Flexible laws are asked where the others leave something clearly visible, and believed where they leave nothing
+        Flexible laws are asked where the others leave something visible, and believed where they leave nothing
         of it: a force beside the element leaves no more than a law within would.
         """
         best = self._in_the_element(self._best_end())
-        if self.left(best) < AS_GOOD * self._least(best) or not any(c.flexible for c in self.candidates):
+        if self.leaves_nothing(best) or not any(c.flexible for c in self.candidates):
             return best
         self._flexible = True
         further = self._best_end()

@@ -1,11 +1,13 @@
-"""A measured friction damper at three tensions of its band: its friction rises, its backlash does not."""
+"""Measured dampers: friction that rises with the tension of a band, and a branch that was added in software."""
 
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
+from subprocess import CompletedProcess, run
 
 import pytest
 
@@ -24,3 +26,21 @@ def test_the_friction_of_a_banded_damper_rises_with_the_tension_and_its_backlash
     low, middle, high = rows["T0"]["values"]
     assert low < middle < high
     assert "lash" not in rows
+
+
+@pytest.mark.ci
+def test_a_branch_planted_into_a_measured_damper_is_found_though_others_explain_most_of_it(
+    root: Path, shared: Path
+) -> None:
+    """They leave 3.6 % of peak of 11.9, of which the model hides 1.9: laws of several numbers are asked as well."""
+    study = run(
+        [sys.executable, "tests/studies/planted.py", "--only", "second_branch", "configs/utfpr.yaml"],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root), "PZD_SHARED": str(shared)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told, ratio = study.stdout.strip().rsplit(" ", 1)
+    assert "right: second_branch" in told
+    assert float(ratio) == pytest.approx(1.0, abs=0.1)
