@@ -183,6 +183,18 @@ def test_a_clock_that_begins_again_is_another_test_and_the_column_that_numbers_t
     assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "Test No"}}).records) == 2
 
 
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_counter_of_so_many_bits_begins_again_and_is_no_other_test(bits: int, tmp_path: Path) -> None:
+    """Of a time in milliseconds, as a microcontroller counts it, that has begun before the record."""
+    wrapped = (2**bits - 100 + 2 * np.arange(TIME.size)) % 2**bits
+    write(tmp_path / "a.csv", lines({"time_ms": wrapped.astype(float), **WITHOUT_TIME}))
+    spec = {"path": "a.csv", "columns": {"time": "time_ms"}, "units": {"time": "ms"}}
+    (said,) = refused(tmp_path, spec)
+    assert f"the clock begins again after {2**bits} ticks, a counter of so many bits; say rate_Hz: 500 and" in said
+    (entry,) = run(tmp_path, {"path": "a.csv", "rate_Hz": 500, "columns": {"time": ""}}).entries
+    assert entry.rate_Hz == pytest.approx(500.0)
+
+
 def test_rows_that_repeat_a_time_or_run_backwards_are_told_as_such_and_what_is_advised_is_accepted(
     tmp_path: Path,
 ) -> None:

@@ -62,10 +62,7 @@ def standstills(test: RawRecord) -> list[str]:
     if steps.max() == 0.0:
         return [told]
     if steps.min() < 0.0:
-        when = "with the column that numbers the tests, or write each into a file of its own"
-        begins = bool(np.all(time[1:][steps < 0.0] < time[:-1][steps < 0.0] - 0.5 * np.ptp(time)))
-        again = Advised(f"{told}; another test begins there;", Advice("split", "{column: HEADER}", when=when))
-        return [again if begins else told]
+        return [_goes_back(test, told, steps)]
     if np.mean(steps == 0.0) < OFTEN:
         return [f"{told}; take the rows that repeat a time out"]
     goes_on = np.flatnonzero(steps > 0.0) + 1  # the first stamp and the last may not be whole ones
@@ -73,6 +70,33 @@ def standstills(test: RawRecord) -> list[str]:
     rate = (last - first) / (time[last] - time[first])
     when = "or what is known of it, and leave out the column of the time"
     return [Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))]
+
+
+def _goes_back(test: RawRecord, told: str, steps: Array) -> str:
+    """Say what a clock does that goes back here and there: a counter begins again, or another test."""
+    time = test.channels[TIME]
+    if wraps_at := _wraps_at(time, steps):
+        rate = Advice("rate_Hz", f"{1.0 / np.median(steps):.5g}", when="and leave out the column of the time")
+        what = f"the clock begins again after {wraps_at} ticks, a counter of so many bits;"
+        return Advised(f"{test.place(int(np.argmin(steps)) + 1)}: {what}", rate)
+    when = "with the column that numbers the tests, or write each into a file of its own"
+    again = Advised(f"{told}; another test begins there;", Advice("split", "{column: HEADER}", when=when))
+    begins = bool(np.all(time[1:][steps < 0.0] < time[:-1][steps < 0.0] - 0.5 * np.ptp(time)))
+    return again if begins else told
+
+
+def _wraps_at(time: Array, steps: Array) -> int | None:
+    """Return the number of ticks after which a counter begins again; None where no counter of whole bytes does.
+
+    All falls are as deep, with the usual step 2^8, 2^16, 2^24 or 2^32 of a decimal tick. What was begun at the same
+    number as it begins again may as well be another test of a round number of samples.
+    """
+    falls, usual = -steps[steps < 0.0], float(np.median(steps[steps > 0.0]))
+    if np.ptp(falls) > usual or abs(time[1:][steps < 0.0][0] - time[0]) <= usual:
+        return None
+    decimal, powers = 10.0 ** np.arange(7)[:, None], 2 ** np.array([8, 16, 24, 32])
+    near = np.abs((float(np.median(falls)) + usual) * decimal - powers) < 0.1 * usual * decimal
+    return int(powers[np.argmax(near.any(axis=0))]) if near.any() else None
 
 
 def _jump(test: RawRecord, layout: Layout) -> list[str]:
