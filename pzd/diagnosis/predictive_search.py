@@ -4,8 +4,8 @@ Weights by noise mislead there: each law is bent towards what is missing, and ta
 fits are by criterion (4), every sample weighted alike, and what decides is the prediction error of tests held out of
 the fit. The search adds an effect, or lets one differ by voltage; where no addition helps it exchanges an adopted
 effect for another, or for two. A step is taken if held-out tests are predicted better, beyond chance, and at no voltage
-worse; if the interpolation error at left-out voltages is not larger; and if the force half-way between two voltages
-passes `interpolation_check`. What is off, or that the prediction does not need, beside the new effect goes.
+worse; if at left-out voltages it loses less than it gains; and if the force half-way between two voltages passes
+`interpolation_check`. What is off, or that the prediction does not need, beside the new effect goes.
 """
 
 from __future__ import annotations
@@ -42,6 +42,9 @@ from pzd.record import Array
 from pzd.signals.measures import rms
 
 log = logging.getLogger(__name__)
+
+SMALLEST = 1e-300
+"""Divisor of a ratio of errors one of which may be zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +89,12 @@ class PredictiveSearch:
     """What would predict as well in the place of an effect of the damper that the search ended with."""
     bent: set[str] = field(default_factory=set)
     """Effects that go wrong between voltages beside those of the current damper: not tried before it is another."""
+    began: PredictionError | None = None
+    """Interpolation error of the damper with which the search began."""
 
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
+        self.began = current.interpolation_error
         while self.validation.campaign.budget.allows_more():
             best = (self._best(current, proposals) for proposals in self._neighbours(current))
             better = next((found for found in best if found is not None), None)
@@ -126,14 +132,30 @@ class PredictiveSearch:
             error = self.validation.error_by_criterion(each.fitted.damper)
             if improves(error, current.error, self.validation):
                 better.append((each, error))
-        for each, error in sorted(better, key=_fewest_parameters_of_alike(better)):
+        while better:
+            # What goes wrong between voltages is no measure of what is alike: the best of the others is.
+            each, error = min(better, key=_fewest_parameters_of_alike(better))
+            better.remove((each, error))
             between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
             found = self.validation.fit_by_criterion(each.fitted.damper, self.validation.no_samples)
-            bends = current.interpolation_error.visibly_below(between)
+            bends = self._loses_between(current, error, between)
             if found is not None and not bends and interpolation_check(found[1].damper, self.validation):
                 return CriterionFit(*found, error, between)
             self.bent |= {*each.fitted.effects} - {*current.fitted.effects}
         return None
+
+    def _loses_between(self, current: CriterionFit, error: PredictionError, between: PredictionError) -> bool:
+        """Whether a step loses at left-out voltages more than it gains at held-out tests, or what is no one's to lose.
+
+        By the ratio of either error: a step that halves the one may cost the other a few per cent, which the next one
+        may win back, but nothing beyond what the search began with.
+        """
+        was, began = current.interpolation_error, self.began or current.interpolation_error
+        if not was.visibly_below(between):
+            return False
+        gained = (current.error.criterion or 0.0) / max(error.criterion or 0.0, SMALLEST)
+        lost = (between.criterion or 0.0) / max(was.criterion or 0.0, SMALLEST)
+        return began.visibly_below(between) or lost >= gained
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""

@@ -273,16 +273,17 @@ def _keys(
         for name, unit in in_names.items()
         if unit is None
     ]
-    doubt = None if pattern or VOLTAGE in columns else doubt_in_names([file.path.stem for file in files])
+    stems = [file.path.stem for file in files]
+    doubt = None if control.name in in_names or VOLTAGE in columns else doubt_in_names(stems)
     units += [f"  {doubt[0]}: {doubt[1]}"] if doubt else []
     units += list(_asked_units(files[0], columns, [q for q in missing if q not in several]))
     if units:
         yield "units:"
         yield from units
-    if pattern:
+    if doubt:
+        yield _asked_pattern(*doubt, pattern, stems)
+    elif pattern:
         yield _pattern_key(pattern)
-    elif doubt:
-        yield _asked_pattern(*doubt)
     yield from _events(files[0])
     if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
@@ -359,10 +360,11 @@ def _pattern_key(pattern: str | None) -> str:
     return f"pattern: '{pattern}'    # from the files' names"
 
 
-def _asked_pattern(name: str, unit: str, number: str) -> str:
-    """Write the empty place of a pattern where a number in the names may be two: 0_5A."""
+def _asked_pattern(name: str, unit: str, number: str, others: str | None, stems: Sequence[str]) -> str:
+    """Write the empty place of a pattern where a number in the names may be two: 0_5A; beside what else they hold."""
     mark = "_" if "_" in number else "-"
-    one, other = (f"'(?P<{name}>{digits}){unit}(?![A-Za-z])'" for digits in (f"[0-9]+{mark}[0-9]+", "[0-9]+"))
+    patterns = (f"(?P<{name}>{digits}){unit}(?![A-Za-z])" for digits in (f"[0-9]+{mark}[0-9]+", "[0-9]+"))
+    one, other = (f"'{one_pattern([each, others], stems) or each if others else each}'" for each in patterns)
     whole, last = number.replace(mark, ".").rstrip(unit), number.partition(mark)[2].rstrip(unit)
     return f"pattern: ''   # fill in: is {number} in the names {whole} {unit}, {one}, or {last} {unit}, {other}?"
 

@@ -221,7 +221,12 @@ def _bare(header: str) -> str:
 
 # --- Values in the name of a file: control signal, temperature, position of the clickers ---
 
-_NUMBER = r"(?<![A-Za-z0-9])(?<![0-9][.,])([0-9]+(?:[.xp,][0-9]+)?)"
+_SYMBOLS = {"voltage": "[UV]", "current": "I", "temperature": "T"}
+"""Symbols that may stand before a number: I1p25A, U=100. A is an amplitude as often as amperes."""
+_ALONE = r"(?:(?<![A-Za-z0-9])|(?<=^[UVIT])|(?<=[^A-Za-z0-9][UVIT]))(?<![0-9][.,])"
+_NUMBER = rf"{_ALONE}([0-9]+(?:[.xp,][0-9]+)?)"
+_BEFORE_SYMBOL = re.compile(r"[0-9] ?[A-Za-z%]+ ?=")
+"""A number before a symbol with its own value: of `Test 1 V=0` the 1 is no voltage."""
 _UNITS_IN_NAMES = {
     "voltage": "mV|kV|V|Volts?",
     "current": "mA|A|Amps?",
@@ -229,7 +234,7 @@ _UNITS_IN_NAMES = {
     "temperature": "degC|C",
 }
 _VALUES = {
-    name: re.compile(rf"{_NUMBER}{'' if name == 'temperature' else ' ?'}({units})(?![A-Za-z])")
+    name: re.compile(rf"{_NUMBER}{'' if name == 'temperature' else ' ?'}({units})(?![A-Za-z]| ?=)")
     for name, units in _UNITS_IN_NAMES.items()
 }
 """150V, 0x5A, 0p5A, 0.5 Amp, 40pct, 22degC."""
@@ -270,10 +275,11 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str | None] | 
     comma = "," if any("," in match[1] for _, match in found) else ""
     blank = " ?" * any(match.end(1) < match.start(2) for _, match in found)
     number = f"{'-?' * (True in minus)}[0-9.{comma}xp]+"
+    end = "(?![A-Za-z]| ?=)" if any(map(_BEFORE_SYMBOL.search, stems)) else "(?![A-Za-z])"
     if len(units) > 1:
-        return f"(?P<{name}>{number}{blank}(?:{'|'.join(units)}))(?![A-Za-z])", ""
+        return f"(?P<{name}>{number}{blank}(?:{'|'.join(units)})){end}", ""
     unit = units[0]
-    return f"(?P<{name}>{number}){blank}{unit}(?![A-Za-z])", _spelled_unit(unit)
+    return f"(?P<{name}>{number}){blank}{unit}{end}", _spelled_unit(unit)
 
 
 def _spelled_unit(unit: str) -> str:
@@ -284,6 +290,7 @@ def _spelled_unit(unit: str) -> str:
 def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
     """Return the pattern that finds a number behind the word for a quantity in every name, and its unit if any."""
     word = f"(?i:{_WORDS_IN_NAMES[name]})[ _=]?"
+    word = f"(?:{word}|{_SYMBOLS[name]}=)" if name in _SYMBOLS and not any(map(re.compile(word).search, stems)) else word
     number = "[0-9]+(?:[.xp,][0-9]+)?"
     whole = re.compile(rf"(?<![A-Za-z]){word}{number}({_UNITS_IN_NAMES[name]})?(?![A-Za-z0-9])")
     matches = [whole.search(stem) for stem in stems]
