@@ -43,9 +43,6 @@ from pzd.signals.measures import rms
 
 log = logging.getLogger(__name__)
 
-SMALLEST = 1e-300
-"""Divisor of a ratio of errors one of which may be zero."""
-
 
 @dataclass(frozen=True, eq=False)
 class CriterionFit:
@@ -127,35 +124,34 @@ class PredictiveSearch:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
         here = _Proposal.of(current.problem, current.fitted, self.validation).estimate
         promising = sorted((each for each in tried if each.estimate < here), key=lambda each: each.estimate)
-        better = []
+        better: list[_Tried] = []
         for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
             error = self.validation.error_by_criterion(each.fitted.damper)
             if improves(error, current.error, self.validation):
-                better.append((each, error))
+                between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
+                better.append(_Tried(each, error, between))
         while better:
             # What goes wrong between voltages is no measure of what is alike: the best of the others is.
-            each, error = min(better, key=_fewest_parameters_of_alike(better))
-            better.remove((each, error))
-            between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
-            found = self.validation.fit_by_criterion(each.fitted.damper, self.validation.no_samples)
-            bends = self._loses_between(current, error, between)
+            tried_on = min(better, key=_fewest_parameters_of_alike(better))
+            better.remove(tried_on)
+            damper = tried_on.proposal.fitted.damper
+            found = self.validation.fit_by_criterion(damper, self.validation.no_samples)
+            bends = self._loses_between(current, tried_on)
             if found is not None and not bends and interpolation_check(found[1].damper, self.validation):
-                return CriterionFit(*found, error, between)
-            self.bent |= {*each.fitted.effects} - {*current.fitted.effects}
+                return CriterionFit(*found, tried_on.error, tried_on.interpolation_error)
+            self.bent |= {*damper.effects} - {*current.fitted.effects}
         return None
 
-    def _loses_between(self, current: CriterionFit, error: PredictionError, between: PredictionError) -> bool:
+    def _loses_between(self, current: CriterionFit, tried: _Tried) -> bool:
         """Whether a step loses at left-out voltages more than it gains at held-out tests, or what is no one's to lose.
 
         By the ratio of either error: a step that halves the one may cost the other a few per cent, which the next one
         may win back, but nothing beyond what the search began with.
         """
         was, began = current.interpolation_error, self.began or current.interpolation_error
-        if not was.visibly_below(between):
+        if not was.visibly_below(tried.interpolation_error):
             return False
-        gained = (current.error.criterion or 0.0) / max(error.criterion or 0.0, SMALLEST)
-        lost = (between.criterion or 0.0) / max(was.criterion or 0.0, SMALLEST)
-        return began.visibly_below(between) or lost >= gained
+        return began.visibly_below(tried.interpolation_error) or _merit(tried) >= _merit(current)
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""
@@ -258,16 +254,27 @@ class PredictiveSearch:
         return proposals + self._possible(best.problem, two)
 
 
-def _fewest_parameters_of_alike(
-    better: Sequence[tuple[_Proposal, PredictionError]],
-) -> Callable[[tuple[_Proposal, PredictionError]], tuple[float, float]]:
-    """Return the order of proposals: the best, and those that predict alike, by their parameters, then the others."""
-    least = min((error.criterion or 0.0 for _, error in better), default=0.0)
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A proposal with its prediction errors."""
 
-    def order(pair: tuple[_Proposal, PredictionError]) -> tuple[float, float]:
-        proposal, criterion = pair[0], pair[1].criterion or 0.0
-        alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * criterion <= least
-        return (float(proposal.fitted.optimum.size) if alike else np.inf), criterion
+    proposal: _Proposal
+    error: PredictionError
+    interpolation_error: PredictionError
+
+
+def _merit(found: CriterionFit | _Tried) -> float:
+    """Compute what a step lowers: W_s of held-out tests times that of left-out voltages, where there are any."""
+    return float(np.prod([each.criterion or 1.0 for each in (found.error, found.interpolation_error)]))
+
+
+def _fewest_parameters_of_alike(better: Sequence[_Tried]) -> Callable[[_Tried], tuple[float, float]]:
+    """Return the order of what was tried: the best, and what predicts alike, by the parameters, then the others."""
+    least = min(map(_merit, better), default=0.0)
+
+    def order(tried: _Tried) -> tuple[float, float]:
+        alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * _merit(tried) <= least
+        return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), _merit(tried)
 
     return order
 

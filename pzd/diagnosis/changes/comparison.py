@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
@@ -78,6 +78,9 @@ STAND_TESTS = {
     "recorder_delay": "sine, a steel spring in the place of the damper",
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
+MISSED = 0.05
+"""Share of the force (r.m.s.) that a damper misses in its own tests from which values and intervals are told to be its
+model's: the misfit of a good law on a measured damper stays below."""
 BEYOND_TESTED = 2.0
 """Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
 
@@ -557,8 +560,9 @@ class Findings:
         told = (name or "nothing", *reversed(named))
         of_stand = [c.name for f in (best, *fits) for c in f.candidates if c.name in STAND_TESTS and c.name in told]
         if of_stand:
-            waveform = STAND_TESTS[of_stand[0]]
-            return NextTest(waveform=waveform, frequency_Hz=None, amplitude_m=None, voltage_V=None, separates=told)
+            waveform, separates = STAND_TESTS[of_stand[0]], (of_stand[0], *(t for t in told[name == NOTHING :]))
+            separates = tuple(dict.fromkeys(separates))
+            return NextTest(waveform=waveform, frequency_Hz=None, amplitude_m=None, voltage_V=None, separates=separates)
         dampers = [
             self.first.changed(f.coordinates, f.values.tolist(), None) for f in (best, *reversed(named.values()))
         ]
@@ -788,6 +792,7 @@ class Findings:
         told = [f"{size}, {peak}, of which {left} N are left, {noise} N of them noise"]
         if of_damper:
             told.append(f"of the damper: {', '.join(of_damper)}")
+            told += [words for name in of_damper if (words := self._kind_of_friction(name))]
         elif verdict == "unchanged":
             told.append("nothing of the damper changed visibly")
             if (hidden := self.search.hidden(self.best)) > self.diagnose.visible:
@@ -797,17 +802,46 @@ class Findings:
                 )
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
-        for name, others in rivals.items():
-            if name == NOTHING:
-                told.append(f"{' or '.join(others)} may have changed too, or what is left has no name")
-                continue
-            told.append(f"{name} cannot be told from {' or '.join(others)} by these tests")
-        if verdict == "unexplained":
-            told.append("what is left has no name")
+        told += self._rivals_told(rivals, named=verdict != "unexplained")
+        told += self._left_told(verdict, listed, difference)
         temperatures = self._temperatures()
         if None not in temperatures and abs(temperatures[1] - temperatures[0]) > 0.5:  # type: ignore[operator]  # not None
             told.append(f"the damper was at {temperatures[1]:.3g} degC instead of {temperatures[0]:.3g}")
         return [*told, *self._tests_told()]
+
+    def _rivals_told(self, rivals: dict[str, list[str]], *, named: bool) -> Iterator[str]:
+        """Say what cannot be told apart; where not all is `named`, that something is left is said apart."""
+        for name, others in rivals.items():
+            if name == NOTHING:
+                yield f"{' or '.join(others)} may have changed too{', or what is left has no name' * named}"
+            else:
+                yield f"{name} cannot be told from {' or '.join(others)} by these tests"
+
+    def _left_told(self, verdict: Verdict, listed: Sequence[Change], difference: Difference) -> Iterator[str]:
+        """Say what of the difference has no name, and what the damper of the first state misses of its own tests."""
+        if verdict == "unexplained":
+            yield "what is left has no name"
+        elif verdict == "changed" and not self.search.leaves_nothing(self.best):
+            yield f"{self._left_share(difference):.0%} of the difference (r.m.s. beyond noise) has no name"
+        missed = _missed_share(self.first.damper, self.before.prepared) or 0.0
+        if listed and missed > MISSED:
+            yield (
+                f"the damper of {self.before.name} misses {100.0 * missed:.2g} % of the force in its own tests: the "
+                "values are those of that model, and the intervals those of what changed in it"
+            )
+
+    def _kind_of_friction(self, name: str) -> str | None:
+        """Say of a law that is newly there which friction it is, where its values tell; None of all others."""
+        values = [(c, float(x)) for c, x in zip(self.best.coordinates, self.best.values, strict=True) if c.name == name]
+        if not all(c.absent for c, _ in values):
+            return None
+        if name == "second_branch":
+            return "second_branch is friction behind a spring of its own, as a seal's, beside T0 and k"
+        fastest = max(float(np.max(np.abs(c.motion.velocity))) for c in self.comparisons)
+        speed = next((c.start * float(np.exp(x)) for c, x in values if c.parameter == "v_s"), 0.0)
+        if name == "stribeck_friction" and speed > fastest:
+            return "stribeck_friction that falls off at no tested speed is dry friction beside the oil spring"
+        return None
 
     def _tests_told(self) -> list[str]:
         """Say how the tests were compared, and which are left out or go where no test of the first state came."""

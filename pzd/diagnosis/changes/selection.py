@@ -213,6 +213,9 @@ class Search:
             for c in self.candidates
             if self._flexible or not c.flexible or (in_place and (not c.absent or known()[c.name].place == "parallel"))
         ]
+        # Beside one such force that is newly there another one imitates what its law is off by.
+        if any(c.flexible and c.absent for c in before.candidates):
+            asked = [c for c in asked if not (c.flexible and c.absent)]
         return [c for c in asked if not any(excludes(c, adopted) for adopted in before.candidates)]
 
     def _additions(self, before: Fitted, *, possible: bool = False, opposed: bool = False) -> list[Fitted]:
@@ -243,15 +246,16 @@ class Search:
     def run(self) -> Fitted:
         """Return the changes that explain the difference.
 
-        Flexible laws are asked where the others leave something visible, and believed where they leave nothing
-        of it: a force beside the element leaves no more than a law within would.
+        Flexible laws are asked where the others leave something visible, and believed where they leave little, and less
+        than half as much: a force beside the element leaves hardly more than a law within would.
         """
         best = self._in_the_element(self._best_end())
         if self.leaves_nothing(best) or not any(c.flexible for c in self.candidates):
             return best
         self._flexible = True
         further = self._best_end()
-        self._flexible = self.left(further) < max(self._least(further), self._least(best))
+        little = AS_GOOD * max(self._least(further), self._least(best))
+        self._flexible = self.left(further) < min(little, self.left(best) / AS_GOOD)
         return further if self._flexible else best
 
     def _in_the_element(self, best: Fitted) -> Fitted:
@@ -309,6 +313,12 @@ class Search:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
         return self.left(fitted) < self._least(fitted)
 
+    def _leaves_little(self, fitted: Fitted) -> bool:
+        """Whether a fit has a flexible law that is newly there, and leaves no more than that is off by."""
+        return any(c.flexible and c.absent for c in fitted.candidates) and (
+            self.left(fitted) < AS_GOOD * self._least(fitted)
+        )
+
     def _as_good(self, fitted: Fitted, best: Fitted) -> bool:
         """Whether a fit leaves no more than the best one may leave in its direction."""
         return self.left(fitted) <= max(AS_GOOD * self.left(best), self.hidden(best))
@@ -326,8 +336,13 @@ class Search:
         return self._over_tests(squares)
 
     def _continued(self, best: Fitted) -> Fitted:
-        """Adopt changes as long as something visible is left and the criterion falls by enough."""
+        """Adopt changes as long as something visible is left and the criterion falls by enough.
+
+        Beside a flexible law that is newly there what is left is little sooner: another change would mend its law.
+        """
         while len(best.candidates) < MOST_CHANGES and not self.leaves_nothing(best):
+            if self._leaves_little(best):
+                break
             more = next(iter(self._additions(best)), None)
             if more is None or more.bic - best.bic > self.adopt_bic:
                 break
@@ -358,6 +373,7 @@ class Search:
                 or self.size_of(best, c) < self.adoptable(best)
                 or not self._predicts(best, c)
                 or (less.candidates and not self.leaves_nothing(best) and self._as_good(less, best))
+                or (c.absent and self._leaves_little(less))
             ]
             if not doubtful:
                 return best
