@@ -86,12 +86,9 @@ class PredictiveSearch:
     """What would predict as well in the place of an effect of the damper that the search ended with."""
     bent: set[str] = field(default_factory=set)
     """Effects that go wrong between voltages beside those of the current damper: not tried before it is another."""
-    began: PredictionError | None = None
-    """Interpolation error of the damper with which the search began."""
 
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
-        self.began = current.interpolation_error
         while self.validation.campaign.budget.allows_more():
             best = (self._best(current, proposals) for proposals in self._neighbours(current))
             better = next((found for found in best if found is not None), None)
@@ -146,12 +143,12 @@ class PredictiveSearch:
         """Whether a step loses at left-out voltages more than it gains at held-out tests, or what is no one's to lose.
 
         By the ratio of either error: a step that halves the one may cost the other a few per cent, which the next one
-        may win back, but nothing beyond what the search began with.
+        may win back, but nothing beyond what the plain damper misses there.
         """
-        was, began = current.interpolation_error, self.began or current.interpolation_error
+        was, plain = current.interpolation_error, self.validation.baseline_interpolation_error
         if not was.visibly_below(tried.interpolation_error):
             return False
-        return began.visibly_below(tried.interpolation_error) or _merit(tried) >= _merit(current)
+        return plain.visibly_below(tried.interpolation_error) or _merit(tried) >= _merit(current)
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""
