@@ -184,7 +184,12 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["run", "data"], 2, "data: this is a folder, a file is needed"),
         (["run", "first.yaml", "--set", "sed=1"], 2, "--set sed: no such key; did you mean seed? (got sed)"),
         (["run", "first.yaml", "--set", "seed"], 2, "--set seed: must read a.b=VALUE (got seed)"),
-        (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: VALUE must be one YAML scalar (got [1])"),
+        (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: must be an integer (got [1])"),
+        (
+            ["run", "first.yaml", "--set", "seed={a: 1}"],
+            2,
+            "--set seed: VALUE must be one YAML scalar, or a list of them",
+        ),
         (["run", "first.yaml", "--set", "rig.files.7.path=X"], 2, "--set rig.files.7.path: the list here has 1 item"),
         (["synthesise", "first.yaml"], 2, "pzd synthesise: the config has rig.files, so the command is pzd ingest"),
         (["run", "first.yaml", "--runs", "first.yaml"], 5, "first.yaml"),

@@ -136,9 +136,11 @@ def _with(root: Node, override: str) -> Node:
     except ConfigError as error:
         reason = error.messages[0].rpartition(": ")[2]
         raise ConfigError(f"{name}: VALUE must be one YAML scalar; put text in quotes: {reason} (got {text})") from None
-    if isinstance(value.value, tuple | Mapping):
-        raise ConfigError(f"{name}: VALUE must be one YAML scalar (got {text})")
-    return _put(root, path.split("."), Node(value.value, name), name)
+    items = value.value if isinstance(value.value, tuple) else (value,)
+    if any(isinstance(item.value, tuple | Mapping) for item in items):
+        raise ConfigError(f"{name}: VALUE must be one YAML scalar, or a list of them: [a, b] (got {text})")
+    given = collection(value.value, name) if isinstance(value.value, tuple) else Node(value.value, name)
+    return _put(root, path.split("."), given, name)
 
 
 def _put(node: Node, path: list[str], value: Node, name: str) -> Node:

@@ -183,6 +183,17 @@ def test_a_clock_that_begins_again_is_another_test_and_the_column_that_numbers_t
     assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "Test No"}}).records) == 2
 
 
+def test_tests_of_other_lengths_in_one_file_are_told_as_such(tmp_path: Path) -> None:
+    half = TIME.size // 2
+    rows = np.concatenate([np.arange(TIME.size), np.arange(half), np.arange(half)])
+    numbers = np.repeat([1.0, 2.0, 3.0], [TIME.size, half, half])
+    columns = {"test": numbers} | {name: np.asarray(values)[rows] for name, values in CANONICAL.items()}
+    write(tmp_path / "a.csv", lines(columns))
+    (said,) = refused(tmp_path)
+    assert "another test begins there; say split: {column: HEADER}" in said
+    assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "test"}}).records) == 3
+
+
 @pytest.mark.parametrize("bits", [8, 16])
 def test_a_counter_of_so_many_bits_begins_again_and_is_no_other_test(bits: int, tmp_path: Path) -> None:
     """Of a time in milliseconds, as a microcontroller counts it, that has begun before the record."""

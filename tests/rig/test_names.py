@@ -61,6 +61,9 @@ def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, n
         (("r_40%", "r_80pct"), (40.0, 80.0)),
         (("pwm_40%_a", "pwm80%_a"), (40.0, 80.0)),
         (("strom0.5A", "Strom1A"), (0.5, 1.0)),
+        (("I0p0A_f1Hz_20", "I1p25A_f1Hz_20"), (0.0, 1.25)),
+        (("U=0,0V T=25C f=1 A=20", "U=100,0V T=25C f=2 A=20"), (0.0, 100.0)),  # an amplitude, no amperes
+        (("Test 1 I=0.5A", "Test 2 I=1A"), (0.5, 1.0)),
     ],
 )
 def test_levels_whose_units_differ_from_name_to_name_are_read_each_by_its_own(
@@ -105,6 +108,32 @@ def test_a_number_in_a_name_that_may_be_two_is_asked_for_and_either_answer_is_re
         (tmp_path / "said.yaml").write_text(said, encoding="utf-8")
         config = load(tmp_path / "said.yaml")
         assert {e.voltage_V for e in ingest(config.rig, config.control.signal(), tmp_path).entries} == levels
+
+
+def test_a_number_before_a_symbol_is_no_level_and_the_one_behind_it_is_asked_for_its_unit(tmp_path: Path) -> None:
+    """Of `Test 1 V=0` the number of the test was 1 V."""
+    for number, level in ((1, 0), (2, 100)):
+        write(tmp_path / f"Test {number} V={level}.csv", lines(PLAIN))
+    said = "\n".join(guessed(sorted(tmp_path.glob("*.csv"))))
+    asked = "voltage:   # fill in: the unit of voltage in the files' names"
+    assert asked in said
+    (tmp_path / "guess.yaml").write_text(said.replace(asked, "voltage: V"), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    assert {e.voltage_V for e in ingest(config.rig, config.control.signal(), tmp_path).entries} == {0.0, 100.0}
+
+
+def test_a_doubtful_level_is_asked_for_beside_a_temperature_too(tmp_path: Path) -> None:
+    """The question was lost where the names held a temperature, and both levels were read as one."""
+    for level in ("0", "100"):
+        write(tmp_path / f"D1_{level}V_35C.csv", lines(PLAIN))
+    text = guessed(sorted(tmp_path.glob("*.csv")))
+    (asked,) = (line for line in text if "pattern:" in line)
+    answer = re.findall(r"'(\(\?P[^']+)'", asked)[-1]
+    said = "\n".join(text).replace("pattern: ''", f"pattern: '{answer}'")
+    (tmp_path / "said.yaml").write_text(said, encoding="utf-8")
+    config = load(tmp_path / "said.yaml")
+    entries = ingest(config.rig, config.control.signal(), tmp_path).entries
+    assert [(e.voltage_V, e.temperature_degC) for e in entries] == [(0.0, 35.0), (100.0, 35.0)]
 
 
 def test_levels_in_the_names_of_folders_are_constants_of_their_files(tmp_path: Path) -> None:

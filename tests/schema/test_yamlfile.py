@@ -268,8 +268,8 @@ def test_an_override_of_an_aliased_block_changes_this_place_only(tmp_path: Path)
         ("inner.3.setting=a", "--set inner.3.setting: the list here has 1 item, counted from 0 (got 3)"),
         ("inner.x=a", "--set inner.x: the list here has 1 item"),
         ("name.x=a", "--set name.x: a single value stands before x, it has no keys (got b)"),
-        ("name=[1]", "--set name: VALUE must be one YAML scalar (got [1])"),
-        ("name=a: b", "--set name: VALUE must be one YAML scalar (got a: b)"),
+        ("name=[[1]]", "--set name: VALUE must be one YAML scalar, or a list of them: [a, b] (got [[1]])"),
+        ("name=a: b", "--set name: VALUE must be one YAML scalar, or a list of them: [a, b] (got a: b)"),
         ("name=*x", "--set name: VALUE must be one YAML scalar; put text in quotes"),
         ("name", "--set name: must read a.b=VALUE (got name)"),
         ("=1", "--set =1: must read a.b=VALUE"),
@@ -282,6 +282,10 @@ def test_a_faulty_override_is_named_as_it_was_typed(tmp_path: Path, override: st
     found = faults(tmp_path, "name: b\ninner: [{}]\n", override)
     assert len(found) == 1
     assert found[0].startswith(message)
+
+
+def test_a_list_of_scalars_is_one_value_of_an_override(tmp_path: Path) -> None:
+    assert read(tmp_path, "inner: [{}]\n", "inner.0.voltage_V=[3, 4]").inner[0].voltage_V == (3.0, 4.0)
 
 
 def test_faulty_overrides_are_reported_at_once(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERAT
 from pzd.record import Array
 from pzd.rig.config import FileSplit, Fixture
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout, Values
-from pzd.rig.files.sheet import NO_SAMPLE, ReadingStep, Sheet
+from pzd.rig.files.sheet import IN_STEP, NO_SAMPLE, ReadingStep, Sheet
 from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import nearest
@@ -119,7 +119,8 @@ def _channel(sheet: Sheet, layout: Layout, source: _Source, cells: Array, faults
     empty = np.flatnonzero(np.isnan(cells))
     if empty.size:
         more = f" ({empty.size} such cells)" if empty.size > 1 else ""
-        faults.append(f"{sheet.place(int(empty[0]))}: {head}: empty cell{more}; {NO_SAMPLE}")
+        what_to_do = NO_SAMPLE if layout.entry.rate_Hz is None else IN_STEP
+        faults.append(f"{sheet.place(int(empty[0]))}: {head}: empty cell{more}; {what_to_do}")
         return None
     try:
         channel = source.spec.sign * to_canonical(cells, source.unit, own)

@@ -81,7 +81,9 @@ def _goes_back(test: RawRecord, told: str, steps: Array) -> str:
         return Advised(f"{test.place(int(np.argmin(steps)) + 1)}: {what}", rate)
     when = "with the column that numbers the tests, or write each into a file of its own"
     again = Advised(f"{told}; another test begins there;", Advice("split", "{column: HEADER}", when=when))
-    begins = bool(np.all(time[1:][steps < 0.0] < time[:-1][steps < 0.0] - 0.5 * np.ptp(time)))
+    goes_on = time[1:][steps < 0.0]
+    far_back = np.all(goes_on < time[:-1][steps < 0.0] - 0.5 * np.ptp(time))
+    begins = bool(far_back or np.all(np.abs(goes_on - time[0]) <= np.median(steps)))  # tests differ in length
     return again if begins else told
 
 

@@ -86,6 +86,8 @@ def text_bytes(path: Path) -> bytes:
 
 _POINT_OF_THOUSANDS = re.compile(r"(?<=\d)\.(?=\d{3}(?:\.\d{3})*,\d)")
 """A point before three digits and a comma, where that is the decimal one."""
+_QUOTED_COMMAS = re.compile(r'"\s*[+-]?\d{1,3}(?:,\d{3})+\.\d*\s*"')
+"""A number in quotes with commas between its thousands and a point: outside of quotes a comma may separate."""
 _BETWEEN_THOUSANDS = re.compile(r"(?<=\d)['\u2019\u00a0\u202f](?=\d{3})")
 """Marks that stand between digits for nothing but thousands; a comma or a point may be that of a decimal."""
 
@@ -99,9 +101,13 @@ def plain_numbers(text: str, decimal: str = ".") -> str:
     '-1234,5'
     >>> plain_numbers("1.234,5", ",")
     '1234,5'
+    >>> plain_numbers('0.1,"1,077.59"')
+    '0.1,"1077.59"'
     """
     if decimal == ",":
         text = _POINT_OF_THOUSANDS.sub("", text)
+    elif '"' in text:
+        text = _QUOTED_COMMAS.sub(lambda found: found[0].replace(",", ""), text)
     if "\u2212" in text:
         text = text.replace("\u2212", "-")
     return _BETWEEN_THOUSANDS.sub("", text) if any(mark in text for mark in "'\u2019\u00a0\u202f") else text

@@ -291,6 +291,10 @@ def spelled(value: Any) -> str:
 
 NO_SAMPLE = "take a row without a value out: it is told as a lost sample"
 """What to do about a cell that holds no value of its channel."""
+IN_STEP = (
+    "write the mean of its neighbours there: no column holds the time, and a row taken out would shift those behind it"
+)
+"""The same where the rows are counted by `rate_Hz`."""
 MOST_BELOW = 10
 """Lines of words below a table; more are none."""
 
