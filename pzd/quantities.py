@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s2], one g by definition."""
+
 # Units as spelled inside a column name or a JSON key; others stand as they are.
 _SPELLED = {
     "m/s": "m_per_s",

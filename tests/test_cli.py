@@ -184,7 +184,7 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["run", "data"], 2, "data: this is a folder, a file is needed"),
         (["run", "first.yaml", "--set", "sed=1"], 2, "--set sed: no such key; did you mean seed? (got sed)"),
         (["run", "first.yaml", "--set", "seed"], 2, "--set seed: must read a.b=VALUE (got seed)"),
-        (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: must be an integer (got [1])"),
+        (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: must be a whole number (got [1])"),
         (
             ["run", "first.yaml", "--set", "seed={a: 1}"],
             2,

@@ -10,14 +10,13 @@ import numpy as np
 from pzd.comfort import directive
 from pzd.comfort.iso2631_1997 import HEALTH_ZONES, Evaluation, evaluate
 from pzd.comfort.weighting import WC, WD, WE, WF, WJ, WK, Weighting, weighted_record
+from pzd.quantities import GRAVITY
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import nearest
 from pzd.signals.measures import rms
 
-STANDARD_GRAVITY = 9.80665
-"""One g [m/s2], by definition."""
-UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "rad/s2": 1.0}
+UNITS = {"m/s2": 1.0, "g": GRAVITY, "rad/s2": 1.0}
 """Units of a record, each in SI."""
 FEWEST = 2
 """Samples of a record."""

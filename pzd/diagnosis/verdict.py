@@ -90,6 +90,10 @@ def conclude(
             stands = "it stands" if len(added) == 1 else "they stand"
             words = f"kept-back tests are predicted better with {' and '.join(added)}, whatever {stands} for"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
+        damper = adoption.selection.fitted.damper
+        if "rounded_yield" in damper.effects and all(row.voltage_V is None for row in damper.base):
+            words = "a valve with bleed and blow-off looks like a rounded yield: identify.law: auto tries the knee law"
+            decision = replace(decision, reason=f"{decision.reason}; {words}")
     return adoption, decision
 
 

@@ -154,6 +154,8 @@ class Damper(Result):
     ) -> Array:
         """Compute the force along a motion, with the oil spring, from a damper that is relaxed at the first sample.
 
+        It is the force as the stand of the tests records it: with `sensor_delay`, where the damper has it.
+
         Parameters
         ----------
         time : (n,) strictly increasing [s]

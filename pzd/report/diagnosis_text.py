@@ -93,6 +93,8 @@ def headline(diagnosis: Diagnosis) -> str:
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
     if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and not _confident(diagnosis.confidence):
         return _DOUBTFUL[diagnosis.verdict]
+    if diagnosis.verdict == "unexplained" and diagnosis.gap is None and not diagnosis.ranking:
+        return "the law that was fitted leaves a gap, and no effect was looked for beside it"
     if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
     predict = "predicts, whatever it stands for" if len(useful) == 1 else "predict, whatever they stand for"

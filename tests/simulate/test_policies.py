@@ -11,6 +11,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import solve_continuous_lyapunov
 
+from pzd.quantities import GRAVITY
 from pzd.schema.model import Frozen
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.control.demand import (
@@ -28,7 +29,7 @@ from pzd.simulate.ride.model import dynamic_damper_of, grid_of
 from pzd.simulate.ride.riding import ride_case
 from pzd.simulate.roads import Way
 from pzd.simulate.study.plan import Case
-from pzd.simulate.vehicle.car import GRAVITY, HalfCar
+from pzd.simulate.vehicle.car import HalfCar
 
 SHORT = {"duration_s": 3.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
 SYMMETRIC = {"a1_m": 1.5, "a2_m": 1.5, "pitch_inertia_kgm2": 2700.0, "x_K_m": 0.0, "mass_kg": 1200.0}

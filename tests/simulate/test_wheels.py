@@ -10,11 +10,11 @@ import pytest
 from simulate_dampers import damper_after_table_2, table_of
 
 from pzd.artefacts import Diagnosed, Rides
+from pzd.quantities import GRAVITY
 from pzd.simulate.cars import cars
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.linear import harmonic_response
 from pzd.simulate.stage import simulate
-from pzd.simulate.vehicle.car import GRAVITY
 
 CAR = cars()["makowski2021"]
 

@@ -11,10 +11,11 @@ from pydantic import ValidationError
 from scipy.linalg import expm
 from scipy.signal import lsim
 
+from pzd.quantities import GRAVITY
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.roads import Way
-from pzd.simulate.vehicle.car import GRAVITY, HalfCar
+from pzd.simulate.vehicle.car import HalfCar
 from pzd.simulate.vehicle.suspension import contact_force, tyre_energy, tyre_spring_force
 
 WHEELS = {

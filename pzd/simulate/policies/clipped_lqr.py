@@ -19,10 +19,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
+from pzd.quantities import GRAVITY
 from pzd.record import Array
 from pzd.schema.model import Frozen
 from pzd.simulate.policies import BODY_RATES, DEFLECTIONS, SENSED, Policy
-from pzd.simulate.vehicle.car import GRAVITY, HalfCar
+from pzd.simulate.vehicle.car import HalfCar
 
 
 class ClippedLqr(Frozen):

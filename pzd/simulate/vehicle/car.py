@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.quantities import GRAVITY
 from pzd.record import Array, Complex
-
-GRAVITY = 9.80665
-"""Standard acceleration of free fall [m/s2]."""
 
 
 @dataclass(frozen=True)
