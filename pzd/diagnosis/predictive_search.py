@@ -121,34 +121,23 @@ class PredictiveSearch:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
         here = _Proposal.of(current.problem, current.fitted, self.validation).estimate
         promising = sorted((each for each in tried if each.estimate < here), key=lambda each: each.estimate)
-        better: list[_Tried] = []
+        better: list[Tried] = []
         for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
             error = self.validation.error_by_criterion(each.fitted.damper)
             if improves(error, current.error, self.validation):
                 between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
-                better.append(_Tried(each, error, between))
+                better.append(Tried(each, error, between))
         while better:
             # What goes wrong between voltages is no measure of what is alike: the best of the others is.
             tried_on = min(better, key=_fewest_parameters_of_alike(better))
             better.remove(tried_on)
             damper = tried_on.proposal.fitted.damper
             found = self.validation.fit_by_criterion(damper, self.validation.no_samples)
-            bends = self._loses_between(current, tried_on)
+            bends = loses_between(current, tried_on, self.validation.baseline_interpolation_error)
             if found is not None and not bends and interpolation_check(found[1].damper, self.validation):
                 return CriterionFit(*found, tried_on.error, tried_on.interpolation_error)
             self.bent |= {*damper.effects} - {*current.fitted.effects}
         return None
-
-    def _loses_between(self, current: CriterionFit, tried: _Tried) -> bool:
-        """Whether a step loses at left-out voltages more than it gains at held-out tests, or what is no one's to lose.
-
-        By the ratio of either error: a step that halves the one may cost the other a few per cent, which the next one
-        may win back, but nothing beyond what the plain damper misses there.
-        """
-        was, plain = current.interpolation_error, self.validation.baseline_interpolation_error
-        if not was.visibly_below(tried.interpolation_error):
-            return False
-        return plain.visibly_below(tried.interpolation_error) or _merit(tried) >= _merit(current)
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
         """Return what a further effect gives, or an adopted one with its parameters per voltage."""
@@ -252,7 +241,7 @@ class PredictiveSearch:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class Tried:
     """A proposal with its prediction errors."""
 
     proposal: _Proposal
@@ -260,16 +249,28 @@ class _Tried:
     interpolation_error: PredictionError
 
 
-def _merit(found: CriterionFit | _Tried) -> float:
+def _merit(found: CriterionFit | Tried) -> float:
     """Compute what a step lowers: W_s of held-out tests times that of left-out voltages, where there are any."""
-    return float(np.prod([each.criterion or 1.0 for each in (found.error, found.interpolation_error)]))
+    held_out, between = found.error.criterion, found.interpolation_error.criterion
+    return (1.0 if held_out is None else held_out) * (1.0 if between is None else between)
 
 
-def _fewest_parameters_of_alike(better: Sequence[_Tried]) -> Callable[[_Tried], tuple[float, float]]:
+def loses_between(current: CriterionFit | Tried, tried: Tried, plain: PredictionError) -> bool:
+    """Whether a step loses at left-out voltages more than it gains at held-out tests, or what is no one's to lose.
+
+    By the ratio of either error: a step that halves the one may cost the other a few per cent, which the next one may
+    win back, but nothing beyond what the plain damper misses there.
+    """
+    if not current.interpolation_error.visibly_below(tried.interpolation_error):
+        return False
+    return plain.visibly_below(tried.interpolation_error) or _merit(tried) >= _merit(current)
+
+
+def _fewest_parameters_of_alike(better: Sequence[Tried]) -> Callable[[Tried], tuple[float, float]]:
     """Return the order of what was tried: the best, and what predicts alike, by the parameters, then the others."""
     least = min(map(_merit, better), default=0.0)
 
-    def order(tried: _Tried) -> tuple[float, float]:
+    def order(tried: Tried) -> tuple[float, float]:
         alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * _merit(tried) <= least
         return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), _merit(tried)
 
