@@ -90,11 +90,22 @@ def conclude(
             stands = "it stands" if len(added) == 1 else "they stand"
             words = f"kept-back tests are predicted better with {' and '.join(added)}, whatever {stands} for"
             decision = replace(decision, reason=f"{decision.reason}; {words}")
-        damper = adoption.selection.fitted.damper
-        if "rounded_yield" in damper.effects and all(row.voltage_V is None for row in damper.base):
-            words = "a valve with bleed and blow-off looks like a rounded yield: identify.law: auto tries the knee law"
-            decision = replace(decision, reason=f"{decision.reason}; {words}")
-    return adoption, decision
+    hints = "".join(f"; {hint}" for hint in _hints(adoption, decision))
+    return adoption, replace(decision, reason=f"{decision.reason}{hints}")
+
+
+def _hints(adoption: Adoption, decision: Decision) -> Iterator[str]:
+    """Yield what else may look like the adopted effects, and what would tell."""
+    selection = adoption.selection
+    damper, told = selection.fitted.damper, {*selection.adopted, *selection.rivals, *decision.possible}
+    passive = all(row.voltage_V is None for row in damper.base)
+    if decision.verdict == "unexplained" and passive and "rounded_yield" in damper.effects:
+        yield "a valve with bleed and blow-off looks like a rounded yield: identify.law: auto tries the knee law"
+    if {"valve_lag", "piezo_hysteresis"} <= told:
+        yield (
+            "a control signal that moves at rates farther apart tells a lag, whose force grows with the rate, from a "
+            "hysteresis, whose force does not: until then the force under a faster one is not known"
+        )
 
 
 def _decided(adoption: Adoption, config: DiagnoseConfig) -> Decision:
