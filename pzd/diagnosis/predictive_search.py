@@ -4,8 +4,9 @@ Weights by noise mislead there: each law is bent towards what is missing, and ta
 fits are by criterion (4), every sample weighted alike, and what decides is the prediction error of tests held out of
 the fit. The search adds an effect, or lets one differ by voltage; where no addition helps it exchanges an adopted
 effect for another, or for two. A step is taken if held-out tests are predicted better, beyond chance, and at no voltage
-worse; if at left-out voltages it loses less than it gains; and if the force half-way between two voltages passes
-`interpolation_check`. What is off, or that the prediction does not need, beside the new effect goes.
+worse; if the interpolation error at left-out voltages is not larger, or where no step is like that, if it loses less
+there than it gains; and if the force half-way between two voltages passes `interpolation_check`. What is off, or that
+the prediction does not need, beside the new effect goes.
 """
 
 from __future__ import annotations
@@ -86,12 +87,17 @@ class PredictiveSearch:
     """What would predict as well in the place of an effect of the damper that the search ended with."""
     bent: set[str] = field(default_factory=set)
     """Effects that go wrong between voltages beside those of the current damper: not tried before it is another."""
+    losing: list[CriterionFit] = field(default_factory=list)
+    """Steps from the current damper that lose between voltages less than they gain: taken where no other is left."""
 
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
         while self.validation.campaign.budget.allows_more():
+            self.losing.clear()
             best = (self._best(current, proposals) for proposals in self._neighbours(current))
             better = next((found for found in best if found is not None), None)
+            # Where every step loses something between voltages, that which loses least for what it gains.
+            better = better or min(self.losing, key=_merit, default=None)
             if better is None:
                 return current
             log.info("diagnose: %s, W_s of kept-back tests %.4g", _names(better), better.error.criterion)
@@ -133,9 +139,12 @@ class PredictiveSearch:
             better.remove(tried_on)
             damper = tried_on.proposal.fitted.damper
             found = self.validation.fit_by_criterion(damper, self.validation.no_samples)
-            bends = loses_between(current, tried_on, self.validation.baseline_interpolation_error)
-            if found is not None and not bends and interpolation_check(found[1].damper, self.validation):
-                return CriterionFit(*found, tried_on.error, tried_on.interpolation_error)
+            too_much = loses_between(current, tried_on, self.validation.baseline_interpolation_error)
+            if found is not None and not too_much and interpolation_check(found[1].damper, self.validation):
+                step = CriterionFit(*found, tried_on.error, tried_on.interpolation_error)
+                if not current.interpolation_error.visibly_below(step.interpolation_error):
+                    return step
+                self.losing.append(step)
             self.bent |= {*damper.effects} - {*current.fitted.effects}
         return None
 
@@ -268,11 +277,12 @@ def loses_between(current: CriterionFit | Tried, tried: Tried, plain: Prediction
 
 def _fewest_parameters_of_alike(better: Sequence[Tried]) -> Callable[[Tried], tuple[float, float]]:
     """Return the order of what was tried: the best, and what predicts alike, by the parameters, then the others."""
-    least = min(map(_merit, better), default=0.0)
+    least = min((each.error.criterion or 0.0 for each in better), default=0.0)
 
     def order(tried: Tried) -> tuple[float, float]:
-        alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * _merit(tried) <= least
-        return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), _merit(tried)
+        criterion = tried.error.criterion or 0.0
+        alike = (1.0 - thresholds.LEAST_PREDICTION_GAIN) * criterion <= least
+        return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), criterion
 
     return order
 
