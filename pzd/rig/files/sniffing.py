@@ -221,8 +221,8 @@ def _bare(header: str) -> str:
 
 # --- Values in the name of a file: control signal, temperature, position of the clickers ---
 
-_SYMBOLS = {"voltage": "[UV]", "current": "I", "temperature": "T"}
-"""Symbols that may stand before a number: I1p25A, U=100. A is an amplitude as often as amperes."""
+_SYMBOLS = {"voltage": "[UV]", "current": "I"}
+"""Symbols that may stand before a number: I1p25A, U=100. A is an amplitude as often as amperes, T a period."""
 _ALONE = r"(?:(?<![A-Za-z0-9])|(?<=^[UVIT])|(?<=[^A-Za-z0-9][UVIT]))(?<![0-9][.,])"
 _NUMBER = rf"{_ALONE}([0-9]+(?:[.xp,][0-9]+)?)"
 _BEFORE_SYMBOL = re.compile(r"[0-9] ?[A-Za-z%]+ ?=")
