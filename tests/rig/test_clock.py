@@ -218,3 +218,12 @@ def test_rows_that_repeat_a_time_or_run_backwards_are_told_as_such_and_what_is_a
     assert said.endswith("; the rows run backwards: turn them round")
     write(tmp_path / "a.csv", text)
     assert len(run(tmp_path).records) == 1
+
+
+def test_a_row_without_a_value_is_not_to_be_taken_out_where_no_column_holds_the_time(tmp_path: Path) -> None:
+    """It would shift all rows behind it by a sample, without a word."""
+    text = lines(WITHOUT_TIME)
+    text[7] = text[7].rpartition(",")[0] + ","
+    write(tmp_path / "a.csv", text)
+    (said,) = refused(tmp_path, {"path": "a.csv", "rate_Hz": 500, "columns": {"time": ""}})
+    assert "empty cell; write the mean of its neighbours there: no column holds the time" in said
