@@ -808,6 +808,11 @@ def test_intervals_beside_a_force_without_a_name_say_what_they_leave_out() -> No
     assert not any(line.startswith("intervals: ") for line in diagnosis_lines(diagnosis(), Control()))
 
 
+def test_a_fitted_law_that_leaves_a_gap_is_told_apart_from_a_gap_for_which_effects_were_tried() -> None:
+    knee = diagnosis().model_copy(update={"verdict": "unexplained", "gap": None, "ranking": (), "effects": ()})
+    assert headline(knee) == "the law that was fitted leaves a gap, and no effect was looked for beside it"
+
+
 def test_the_story_of_an_unexplained_gap_begins_with_what_is_known() -> None:
     """The effect that closes most comes first; one that is open, or closes nothing, is not listed."""
     shares = {"gas_spring": (0.09, "likely"), "rounded_yield": (0.61, "certain"), "lash": (0.3, "open")}

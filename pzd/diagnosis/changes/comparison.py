@@ -79,8 +79,9 @@ STAND_TESTS = {
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
 MISSED = 0.05
-"""Share of the force (r.m.s.) that a damper misses in its own tests from which values and intervals are told to be its
-model's: the misfit of a good law on a measured damper stays below."""
+"""Share of the force (r.m.s.) that the first damper misses in its own tests from which values are told to be its model's.
+
+Reason: a model off by a twentieth has T0 and C off by about as much, more than the intervals of a change; not tuned."""
 BEYOND_TESTED = 2.0
 """Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
 
@@ -560,8 +561,9 @@ class Findings:
         told = (name or "nothing", *reversed(named))
         of_stand = [c.name for f in (best, *fits) for c in f.candidates if c.name in STAND_TESTS and c.name in told]
         if of_stand:
-            waveform, separates = STAND_TESTS[of_stand[0]], (of_stand[0], *(t for t in told[name == NOTHING :]))
-            separates = tuple(dict.fromkeys(separates))
+            # At rest a stand shows itself, and nothing of what else may have changed beside nothing.
+            separates = tuple(dict.fromkeys((of_stand[0], *(each for each in told if each != "nothing"))))
+            waveform = STAND_TESTS[of_stand[0]]
             return NextTest(waveform=waveform, frequency_Hz=None, amplitude_m=None, voltage_V=None, separates=separates)
         dampers = [
             self.first.changed(f.coordinates, f.values.tolist(), None) for f in (best, *reversed(named.values()))

@@ -362,7 +362,8 @@ class Search:
     def _without_superfluous(self, best: Fitted) -> Fitted:
         """Leave out what does not pay, is not visible, or predicts held-out tests worse than its absence.
 
-        Of several changes that leave something visible, also one without which the others are as good.
+        Of several changes that leave something visible, also one without which the others are as good; and what is
+        newly there beside a flexible law that leaves little without it.
         """
         while best.candidates:
             fewer = [(self.without(best, c), c) for c in best.candidates]

@@ -290,9 +290,8 @@ def _spelled_unit(unit: str) -> str:
 def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
     """Return the pattern that finds a number behind the word for a quantity in every name, and its unit if any."""
     word = f"(?i:{_WORDS_IN_NAMES[name]})[ _=]?"
-    word = (
-        f"(?:{word}|{_SYMBOLS[name]}=)" if name in _SYMBOLS and not any(map(re.compile(word).search, stems)) else word
-    )
+    if name in _SYMBOLS and not any(re.search(word, stem) for stem in stems):
+        word = f"{_SYMBOLS[name]}="
     number = "[0-9]+(?:[.xp,][0-9]+)?"
     whole = re.compile(rf"(?<![A-Za-z]){word}{number}({_UNITS_IN_NAMES[name]})?(?![A-Za-z0-9])")
     matches = [whole.search(stem) for stem in stems]
