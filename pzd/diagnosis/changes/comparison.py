@@ -79,7 +79,7 @@ STAND_TESTS = {
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
 MISSED = 0.05
-"""Share of the force (r.m.s.) that the first damper misses in its own tests from which values are told to be its model's.
+"""Share of the force (r.m.s.) that the first damper misses in its own tests from which values are its model's.
 
 Reason: a model off by a twentieth has T0 and C off by about as much, more than the intervals of a change; not tuned."""
 BEYOND_TESTED = 2.0
