@@ -16,6 +16,7 @@ from pzd.artefacts import (
     ComfortRow,
     Diagnosed,
     Diagnosis,
+    Finding,
     ForceRow,
     Gap,
     Identified,
@@ -50,6 +51,8 @@ from pzd.simulate.config import SimulateConfig
 NAMES = ["ingest", "identify", "diagnose", "table", "simulate", "report"]
 UNDETERMINED = 99
 """A seed with which C is undetermined."""
+LOUD = Finding(check="range", where="all of it", size=901.0, unit="N", follows="look at the load cell")
+"""Found in a test with more than 900 N."""
 NEXT_TEST = NextTest(
     waveform="sine",
     frequency_Hz=4.0,
@@ -70,7 +73,15 @@ def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:
         raise DataError(f"{path}:1: a number is needed (got nonsense)" for path in wrong)
     records = tuple(_record(one.path, one.entry.setting) for one in files)
     entries = [
-        RecordEntry(name=r.name, setting=r.setting, voltage_V=1.0, temperature_degC=22.0, rate_Hz=1.0, cycles=0.0)
+        RecordEntry(
+            name=r.name,
+            setting=r.setting,
+            voltage_V=1.0,
+            temperature_degC=22.0,
+            rate_Hz=1.0,
+            cycles=0.0,
+            findings=(LOUD,) if r.force[0] > 900.0 else (),
+        )
         for r in records
     ]
     return Rig(records, tuple(entries))

@@ -133,6 +133,14 @@ def test_expected_numbers_that_change_rerun_the_report_alone(bench: Bench) -> No
     assert stale_stages(opened(bench.config, bench.runs, ["report.reference=lab.csv"])) == {"report": "lab.csv is gone"}
 
 
+def test_what_the_preflight_finds_is_said_with_where_it_is_told_whole(bench: Bench) -> None:
+    bench()
+    assert not any("finding" in line for line in bench.lines)
+    (bench.config.parent / "data" / "b.csv").write_text("901")
+    bench()
+    assert f"ingest     1 finding, b: range: all of it; pzd check {bench.config} prints what follows" in bench.lines
+
+
 def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:
     bench()
     for name in ("a", "b"):

@@ -77,8 +77,9 @@ class BlindConfig(EngineConfig):
     sizes: tuple[float, float] = (0.02, 0.2)
     """Smallest and largest effect, as a share of the peak of the record that it changes most: the amplitude of the sine
     that has the r.m.s. of the change."""
-    base_spread: float = Field(default=0.1, ge=0.0, lt=1.0)
-    """T0, C and k of every row lie within this share of those in `rig.virtual`."""
+    base_spread: float | None = Field(default=None, ge=0.0, lt=1.0)
+    """T0, C and k of every row lie within this share of those in `rig.virtual`; empty: they are drawn from everywhere,
+    friction alone to viscous alone and stiff to soft, for the control signals of `rig.virtual`."""
     force_noise: tuple[float, ...] = Field(default=(0.005, 0.01, 0.02, 0.03), min_length=1)
     """Noise of the force, as shares of the record's peak; a case has one of them."""
     noise_rho: tuple[float, ...] = Field(default=(0.0, 0.5, 0.9), min_length=1)

@@ -1,7 +1,8 @@
 """Draws a case by either generator; its rig files go where the diagnosis looks, its truth where it does not.
 
-The virtual rig draws a damper near that of the config and hides in it effects of the library, each of a drawn size, or
-a form outside the library. Cases of the second generator are drawn by `pzd.blind.independent`, and handed over here.
+The virtual rig draws a damper from everywhere, or near that of the config, and hides in it effects of the library, each
+of a drawn size, or a form outside the library. Cases of the second generator are drawn by `pzd.blind.independent`, and
+handed over here.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from pzd.blind.case import CaseFiles, NoiseFreeRecord, Truth, write_noise_free
 from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.independent.case import HiddenLaws, IndependentCase, drawn_case
+from pzd.blind.independent.damper_space import elastic_levels
 from pzd.blind.independent.outside import OUTSIDE
 from pzd.blind.outside import FORMS, Envelope
 from pzd.blind.plan import PlannedCase
@@ -26,7 +29,7 @@ from pzd.damper.motion import Motion
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
 from pzd.record import Array
-from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
+from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry, Warming
 from pzd.rig.stand.frame import force_in_frame
 from pzd.rig.stand.recording import StandRecord, run_campaign
 from pzd.schema.csvfile import write_columns
@@ -109,7 +112,11 @@ def draw_case(setup: BenchmarkSetup, planned: PlannedCase) -> DrawnCase:
     displacement_noise = float(np.exp(rng.uniform(*np.log(blind.displacement_noise_m))))
     warms = bool(rng.random() < blind.warming_share) or planned.needs("temperature")
     wanted = {name: float(np.exp(rng.uniform(*np.log(blind.sizes)))) for name in planned.hidden}
-    stand = _quiet_stand(setup, campaign, _scattered(setup.stand.damper, blind.base_spread, rng), warms=warms)
+    stand = _quiet_stand(setup, campaign, warms=warms)
+    if blind.base_spread is None:
+        stand = _with_any_damper(stand, stand_seed, setup.control, rng)
+    else:
+        stand = stand.model_copy(update={"damper": _scattered(stand.damper, blind.base_spread, rng)})
     at_rate = stand.model_copy(update={"oversampling": 1})  # sizes need no finer steps
     baseline = _noise_free(run_campaign(at_rate, stand_seed, control=setup.control))
     form: HiddenForm | None = None
@@ -144,6 +151,28 @@ def draw_case(setup: BenchmarkSetup, planned: PlannedCase) -> DrawnCase:
     return DrawnCase(truth, rig_files, noise_free)
 
 
+def _with_any_damper(stand: VirtualEntry, seed: int, control: Control, rng: np.random.Generator) -> VirtualEntry:
+    """Return the stand with a damper from everywhere, and a load cell and a heat capacity that suit its force."""
+    records = _noise_free(run_campaign(stand.model_copy(update={"oversampling": 1}), seed, control=control))
+    envelope = _envelope(records)
+    stroke = min(float(np.ptp(record.motion.displacement)) for record in records)
+    voltages = sorted({row.voltage_V or 0.0 for row in stand.damper.base})
+    drawn = elastic_levels(rng, len(voltages), envelope.speed, stroke)
+    rows = [drawn[voltages.index(row.voltage_V or 0.0)] for row in stand.damper.base]
+    strongest = float(np.max(drawn[:, 0] + drawn[:, 1] * envelope.speed))
+    stronger = strongest / max(record.peak for record in records)
+    resolution = stand.resolution.model_copy(update={"force_N": stronger * stand.resolution.force_N})
+    changes: dict[str, Any] = {"damper": Damper(base=_with_values(stand.damper.base, rows)), "resolution": resolution}
+    if stand.temperatures_degC:
+        changes["temperatures_degC"] = tuple(
+            t.model_copy(update={"heat_capacity_J_per_K": stronger * t.heat_capacity_J_per_K})
+            if isinstance(t, Warming)
+            else t
+            for t in stand.temperatures_degC
+        )
+    return stand.model_copy(update=changes)
+
+
 def _scattered(damper: Damper, spread: float, rng: np.random.Generator) -> Damper:
     """Scale T0, C and k of every row, half by factors of the case and half by the row's own."""
     common = rng.uniform(-0.5, 0.5, 3)
@@ -153,21 +182,27 @@ def _scattered(damper: Damper, spread: float, rng: np.random.Generator) -> Dampe
 
 def _scaled_rows(rows: Sequence[BaseRow], factors: Iterable[Array]) -> tuple[BaseRow, ...]:
     """Return rows with T0, C and k multiplied by (3,) factors each."""
+    own = (np.array([row.T0_N, row.C_Ns_per_m, row.k_N_per_m]) for row in rows)
+    return _with_values(rows, [values * factor for values, factor in zip(own, factors, strict=True)])
+
+
+def _with_values(rows: Sequence[BaseRow], values: Iterable[Array]) -> tuple[BaseRow, ...]:
+    """Return rows with (3,) T0, C and k each."""
     return tuple(
         BaseRow(
             voltage_V=row.voltage_V,
             temperature_degC=row.temperature_degC,
-            T0_N=row.T0_N * float(friction),
-            C_Ns_per_m=row.C_Ns_per_m * float(damping),
-            k_N_per_m=row.k_N_per_m * float(stiffness),
+            T0_N=float(T0),
+            C_Ns_per_m=float(C),
+            k_N_per_m=float(k),
         )
-        for row, (friction, damping, stiffness) in zip(rows, factors, strict=True)
+        for row, (T0, C, k) in zip(rows, values, strict=True)
     )
 
 
-def _quiet_stand(setup: BenchmarkSetup, campaign: TestPlan, damper: Damper, *, warms: bool) -> VirtualEntry:
+def _quiet_stand(setup: BenchmarkSetup, campaign: TestPlan, *, warms: bool) -> VirtualEntry:
     """Return the stand with this campaign, without noise and jitter."""
-    changes = {"damper": damper, "tests": campaign.tests, "noise": Noise(), "jitter": Jitter(), "setting": None}
+    changes = {"tests": campaign.tests, "noise": Noise(), "jitter": Jitter(), "setting": None}
     warming = {"temperatures_degC": (setup.blind.warming,)} if warms else {}
     return setup.stand.model_copy(update={**changes, **warming})
 
@@ -294,6 +329,7 @@ def _scales(records: Sequence[NoiseFreeRecord], damper: Damper) -> Scales:
         acceleration=max(float(np.max(np.abs(m.acceleration))) for m in motions),
         damping=float(np.median([row.C_Ns_per_m for row in damper.base])),
         voltage=max([float(np.ptp(voltages)), *moving]),
+        flow=tuple((row.T0_N, row.T0_N + row.C_Ns_per_m * envelope.speed) for row in damper.base),
     )
 
 
@@ -360,8 +396,8 @@ def gap_after_refit(records: Sequence[NoiseFreeRecord], damper: Damper) -> float
     def slopes(x: Array) -> Array:
         return np.asarray(np.concatenate([refit.slopes(damper, x) for refit in refits]) / size)
 
-    low = np.tile([0.0, -3.0, -3.0], len(damper.base))
-    high = np.tile([np.inf, 3.0, 3.0], len(damper.base))
+    low = np.tile([0.0, -6.0, -3.0], len(damper.base))
+    high = np.tile([np.inf, 6.0, 3.0], len(damper.base))
     found = least_squares(residuals, start, jac=slopes, bounds=(low, high), max_nfev=_EVALUATIONS, ftol=1e-6, xtol=1e-6)
     return float(np.sqrt(2.0 * found.cost))
 

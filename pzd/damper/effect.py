@@ -20,7 +20,7 @@ stroke
 flow
     One or more changes of the curve that gives the force by the flow speed w = |dy/dt| >= 0:
     |F| = yield(w) + viscous(w) + extra(w), and beyond the force that opens a valve a straight line. All rise with w.
-    `direction_factor`: on T0 and C by the sign of F; `bleed_factor`: on C alone.
+    `direction_factor`: on T0, C and branches by the sign of F; `bleed_factor`: on C alone.
     `yield_force`, `yield_slope`: replace T0, in proportion to it.
     `viscous_force`, `viscous_slope`, `viscous_speed`: replace C w, in proportion to C; speed is the inverse.
     `extra_force`, `extra_slope`: added to both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there

@@ -14,6 +14,7 @@ import numpy as np
 
 from pzd.compiled import compiled
 from pzd.damper.compiled.columns import (
+    BESIDE,
     DRIVE,
     NEUTRAL,
     PARALLEL,
@@ -89,6 +90,13 @@ def rows_per_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]
         else:
             groups.append((voltage, [row]))
     return groups
+
+
+def nearest_condition(rows: Sequence[BaseRow], voltage: float | None, temperature: float | None) -> int:
+    """Return the index of the base row nearest in voltage [V], and of that voltage nearest in temperature [degC]."""
+    _, nearest = min(rows_per_voltage(rows), key=lambda group: abs(group[0] - (voltage or 0.0)))
+    row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - (temperature or 0.0)))
+    return next(i for i, each in enumerate(rows) if each is row)
 
 
 def base_voltages(damper: Damper) -> Array:
@@ -235,7 +243,7 @@ def element_rows(damper: Damper, effective: Array | None, temperature: Array | f
 
 def parallel_rows(damper: Damper, effective: Array | None) -> Array | None:
     """Return the (n, m) or (1, m) rows of the parallel effects; None without any."""
-    return columns_of(damper, PARALLEL, effective) if any(name in damper.effects for name, _ in PARALLEL) else None
+    return columns_of(damper, PARALLEL, effective) if any(name in damper.effects for name, _ in BESIDE) else None
 
 
 def constant_rows(
@@ -243,7 +251,7 @@ def constant_rows(
 ) -> tuple[Array, Array | None]:
     """Return the (1, r) and (1, m) rows of the element and the parallel effects at constant voltage and temperature."""
     row = np.array([[friction, damping, stiffness, *_values(STROKE_AND_FLOW, effects)]])
-    has_parallel = any(name in effects for name, _ in PARALLEL)
+    has_parallel = any(name in effects for name, _ in BESIDE)
     return row, np.array([_values(PARALLEL, effects)]) if has_parallel else None
 
 

@@ -284,7 +284,8 @@ def plain_unless_better(adoption: Adoption, validation: CrossValidation, forced:
     selection, plain = adoption.selection, adoption.baseline_error
     if not selection.adopted or forced:
         return adoption
-    if _predicts(adoption.error, plain, validation):
+    # The gain of a test that no fit has seen is nobody's to know, and hides as well that its shape is missed by more.
+    if _predicts(adoption.error, plain, validation) and _predicts(adoption.error.shapes, plain.shapes, validation):
         return adoption
     kept = _plain(selection, {**selection.reasons, **dict.fromkeys(selection.adopted, NO_BETTER)})
     return Adoption(kept, plain, plain, validation.baseline_interpolation_error)

@@ -14,7 +14,7 @@ import numpy as np
 
 from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.parameter_rows import rows_per_voltage
+from pzd.damper.parameter_rows import nearest_condition
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
@@ -23,7 +23,7 @@ from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
-from pzd.fit.spread import estimated_spread
+from pzd.fit.spread import estimated_spread, nuisance_equations
 from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.measures import criterion, criterion_error
 from pzd.signals.nuisance import NO_NUISANCE, NuisanceConfig
@@ -73,6 +73,10 @@ class Campaign:
     def held_out_checks(self, damper: Damper) -> tuple[ResidualCheck, ...]:
         """Compare every record with a damper, over the held-out samples."""
         return self._against(damper, self.in_role(HELD_OUT))
+
+    def with_offset(self, offset: float) -> Campaign:
+        """Return the campaign with another standard deviation of the offset of a test, as a share of its peak."""
+        return replace(self, nuisance=self.nuisance.model_copy(update={"offset": offset}), _checks={})
 
     def offset(self, damper: Damper) -> float:
         """Compute the median over the records of the mean residual [N], an offset that no effect has to explain."""
@@ -208,7 +212,7 @@ def _shown_by_tests(problem: Problem, damper: Damper, prior: NuisanceConfig) -> 
     # A power law whose flow stands still at a sample has no slope there.
     finite = np.all([np.all(np.isfinite(each), axis=0) for each in slopes], axis=0)
     shared = [each[:, finite] for each in slopes]
-    offset, gain, delay = estimated_spread(own, shared, found.residuals).tolist()
+    offset, gain, delay = estimated_spread([nuisance_equations(own, shared, found.residuals)]).tolist()
     return NuisanceConfig(offset=offset * prior.offset, gain=gain * prior.gain, delay_s=delay * prior.delay_s)
 
 
@@ -247,8 +251,5 @@ def flow_of(damper: Damper, prepared: Sequence[PreparedRecord]) -> tuple[tuple[f
 
 
 def nearest_row(rows: Sequence[BaseRow], prepared: PreparedRecord) -> int:
-    """Return the index of the base row of a record: nearest voltage, and of its rows the nearest temperature."""
-    voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
-    _, nearest = min(rows_per_voltage(rows), key=lambda group: abs(group[0] - voltage))
-    row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - temperature))
-    return next(i for i, each in enumerate(rows) if each is row)
+    """Return the index of the base row of a record."""
+    return nearest_condition(rows, prepared.record.median_voltage(), prepared.record.median_temperature())

@@ -3,10 +3,12 @@
 Weights by noise mislead there: each law is bent towards what is missing, and takes other values on other tests. So all
 fits are by criterion (4), every sample weighted alike, and what decides is the prediction error of tests held out of
 the fit. The search adds an effect, or lets one differ by voltage; where no addition helps it exchanges an adopted
-effect for another, or for two. A step is taken if held-out tests are predicted better, beyond chance, and at no voltage
-worse; if the interpolation error at left-out voltages is not larger, or where no step is like that, if it loses less
-there than it gains; and if the force half-way between two voltages passes `interpolation_check`. What is off, or that
-the prediction does not need, beside the new effect goes.
+effect for another, or for two, and where none of these helps, several for one.
+
+A step is taken if held-out tests are predicted better, beyond chance, and at no voltage worse, or as well by fewer
+parameters; if the interpolation error at left-out voltages is not larger, or where no step is like that, if it loses
+less there than it gains; and if the force half-way between two voltages passes `interpolation_check`. What is off, or
+that the prediction does not need, beside the new effect goes.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ from pzd.diagnosis.search.candidates import (
     problem_for,
     testable,
 )
-from pzd.diagnosis.search.determination import MAY_BE_OFF, showing, undetermined
+from pzd.diagnosis.search.determination import MAY_BE_OFF, cancelling, showing, undetermined
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array
 from pzd.signals.measures import rms
@@ -82,7 +84,7 @@ class PredictiveSearch:
     reached: dict[str, Array] = field(default_factory=dict)
     """Values in the units of the search that the last fit of an effect reached: where the next one starts."""
     off: set[str] = field(default_factory=set)
-    """Effects that were off beside an added one: they are not tried again."""
+    """Effects that were off beside an added one, or cancel another: they are not tried again."""
     alternatives: dict[str, str] = field(default_factory=dict)
     """What would predict as well in the place of an effect of the damper that the search ended with."""
     bent: set[str] = field(default_factory=set)
@@ -109,7 +111,7 @@ class PredictiveSearch:
         return current
 
     def _neighbours(self, current: CriterionFit) -> Iterator[list[_Proposal]]:
-        """Yield what a step may go to: one effect more, two more, one in the place of another, what is asked last."""
+        """Yield what a step may go to: one effect more, two, one for another, what is asked last, one for several."""
         added = self._additions(current.problem, current.fitted)
         yield added
         budget = self.validation.campaign.budget
@@ -122,6 +124,8 @@ class PredictiveSearch:
         if budget.allows_more():
             last = self._further(current.problem, current.fitted, thresholds.SCREENED_EFFECTS, asked_last=True)
             yield self._possible(current.problem, last)
+        if budget.allows_more():
+            yield self._one_for_several(current)
 
     def _best(self, current: CriterionFit, tried: Sequence[_Proposal]) -> CriterionFit | None:
         """Return what predicts best of those that promise to; None where none improves the prediction."""
@@ -130,7 +134,9 @@ class PredictiveSearch:
         better: list[Tried] = []
         for each in promising[: thresholds.CROSS_VALIDATED_CANDIDATES]:
             error = self.validation.error_by_criterion(each.fitted.damper)
-            if improves(error, current.error, self.validation):
+            fewer = each.fitted.optimum.size < current.fitted.optimum.size
+            wanted = as_good if fewer else improves
+            if wanted(error, current.error, self.validation):
                 between = self.validation.interpolation_error(each.fitted.damper, by_criterion=True)
                 better.append(Tried(each, error, between))
         while better:
@@ -139,13 +145,19 @@ class PredictiveSearch:
             better.remove(tried_on)
             damper = tried_on.proposal.fitted.damper
             found = self.validation.fit_by_criterion(damper, self.validation.no_samples)
+            new = {*damper.effects} - {*current.fitted.effects}
+            # A candidate is fitted in a few evaluations: at its optimum it may be two forces of any size that cancel.
+            cancelled = new & {name for pair in cancelling(*found) for name in pair} if found and new else set()
+            self.off |= cancelled
+            if cancelled:
+                continue
             too_much = loses_between(current, tried_on, self.validation.baseline_interpolation_error)
             if found is not None and not too_much and interpolation_check(found[1].damper, self.validation):
                 step = CriterionFit(*found, tried_on.error, tried_on.interpolation_error)
                 if not current.interpolation_error.visibly_below(step.interpolation_error):
                     return step
                 self.losing.append(step)
-            self.bent |= {*damper.effects} - {*current.fitted.effects}
+            self.bent |= new
         return None
 
     def _additions(self, problem: Problem, fitted: FitResult) -> list[_Proposal]:
@@ -162,15 +174,17 @@ class PredictiveSearch:
         barred: Sequence[str] = (),
         *,
         asked_last: bool = False,
+        for_several: bool = False,
     ) -> list[Candidate]:
         """Fit the most promising effects beside those of a fit, either those that are asked last or all others.
 
         Until so many move the force visibly: what comes to nothing takes no place from the next one. What begins at
         some displacement is not tried: it would grow beyond the recorded stroke, where no test shows it.
         """
-        if len(fitted.effects) >= self.most_effects:
+        if len(fitted.effects) >= self.most_effects and not for_several:
             return []
-        barred = (*fitted.effects, *self.config.forbid, *self.off, *self.bent, *barred)
+        bent = () if for_several else self.bent
+        barred = (*fitted.effects, *self.config.forbid, *self.off, *bent, *barred)
         new = [
             effect
             for effect in library().values()
@@ -231,10 +245,7 @@ class PredictiveSearch:
         for name in current.fitted.effects:
             if name in self.config.force:
                 continue
-            found = self.validation.fit_by_criterion(
-                current.fitted.damper.without_effects(name), self.validation.no_samples
-            )
-            if found is not None:
+            if (found := self._fit_without(current.fitted, name)) is not None:
                 tried = self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
                 tried.sort(key=lambda each: each.estimate)
                 tried[:1] = map(self._searched_on, tried[:1])
@@ -247,6 +258,31 @@ class PredictiveSearch:
         gone = tuple({*current.fitted.effects} - {*best.fitted.effects})
         two = self._further(best.problem, best.fitted, thresholds.EXCHANGED_EFFECTS, gone)
         return proposals + self._possible(best.problem, two)
+
+    def _one_for_several(self, current: CriterionFit) -> list[_Proposal]:
+        """Return what one more effect gives without those that are needed least beside it, one by one.
+
+        Two that stand together for a third keep it out: in the place of either it is no better, and beside both it goes
+        wrong between voltages.
+        """
+        proposals: list[_Proposal] = []
+        here = _Proposal.of(current.problem, current.fitted, self.validation).estimate
+        further = self._further(current.problem, current.fitted, thresholds.SCREENED_FOR_SEVERAL, for_several=True)
+        begun = sorted(self._possible(current.problem, further), key=lambda each: each.estimate)
+        for beside_all in begun[: thresholds.FOR_SEVERAL]:
+            at, kept = beside_all, {beside_all.fitted.effects[-1], *self.config.force}
+            while at.estimate < thresholds.NO_WAY_BACK * here:
+                fits = [self._fit_without(at.fitted, name) for name in at.fitted.effects if name not in kept]
+                fewer = [_Proposal.of(*found, self.validation) for found in fits if found is not None]
+                if not fewer:
+                    break
+                at = min(fewer, key=lambda each: each.estimate)
+                proposals.append(at)
+        return [each for each in proposals if len(each.fitted.effects) <= self.most_effects]
+
+    def _fit_without(self, fitted: FitResult, name: str) -> tuple[Problem, FitResult] | None:
+        """Fit a damper again without one of its effects."""
+        return self.validation.fit_by_criterion(fitted.damper.without_effects(name), self.validation.no_samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,6 +338,13 @@ def improves(one: PredictionError, other: PredictionError, validation: CrossVali
         return False
     less = one.criterion <= (1.0 - thresholds.LEAST_PREDICTION_GAIN) * other.criterion
     return less and bool(validation.better_at(one, other)) and not validation.worse_at(one, other)
+
+
+def as_good(one: PredictionError, other: PredictionError, validation: CrossValidation) -> bool:
+    """Whether held-out tests are predicted no worse in all, and at no voltage: then fewer parameters do as well."""
+    if one.criterion is None or other.criterion is None:
+        return False
+    return one.criterion <= other.criterion and not validation.worse_at(one, other)
 
 
 def without_replaced(current: CriterionFit, validation: CrossValidation, forced: Sequence[str]) -> CriterionFit:

@@ -81,6 +81,10 @@ LEAST_CLOSED = 0.2
 
 Reason: what is real is not one of many small corrections. Tests of small force may keep a gap of another kind, as those
 at 0 A of configs/utfpr.yaml do, and would hide what the others show: hence the two counts."""
+ROWS_INSTEAD = 0.5
+"""Share of what a drift with the temperature leaves below which T0, C and k at each temperature take its place.
+
+Reason: rows have more numbers and leave less in any case; half of it no number more does by chance."""
 TRIVIAL_SIZE = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
 """Common offset [share of the lowest peak], delay or lag [s] below which it counts as nothing missing.
 
@@ -159,6 +163,11 @@ CANCELLED_SHARE = 0.1
 
 Reason: an error of a tenth in either is then as large as what both do together; not tuned."""
 
+CONSTANT_WITHIN = 0.15
+"""Standard deviation of a strength from test to test, as a share of it, up to which it counts as a constant.
+
+Reason: what a further effect of `visible` size does to one of 2 % of peak in single tests; not tuned."""
+
 # --- Which tests are held out together (cross_validation.py)
 
 MORE_RESISTANCE = 0.1
@@ -185,6 +194,19 @@ EXCHANGED_EFFECTS = 3
 """Effects that are fitted in the place of an adopted one: those with the largest promised drop of the misfit.
 
 Reason: time; it is asked for every adopted effect. Not tuned."""
+SCREENED_FOR_SEVERAL = 8
+"""Effects that are fitted beside all others, to take the place of several.
+
+Reason: more than elsewhere, since what two others keep out promises little beside both; on configs/utfsm.yaml one that
+predicts held-out tests as well as three others comes after the fifth."""
+FOR_SEVERAL = 3
+"""Effects that are tried in the place of several: those that predict best to first order beside all of them.
+
+Reason: time; each takes a refit for every effect, and again for every one that is left out. Not tuned."""
+NO_WAY_BACK = 2.0
+"""Ratio of W_s of held-out tests, to first order, from which on no further effect is left out in such a place.
+
+Reason: what doubles the error is needed, and the next one would be compared beside what is missed then. Not tuned."""
 CROSS_VALIDATED_CANDIDATES = 3
 """Candidates that are cross-validated: those that predict best to first order.
 
@@ -206,6 +228,18 @@ FEWEST_FOR_A_TREND = 3
 """Degrees of freedom from which a trend over tests is estimated.
 
 Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
+
+# --- Zeros of the load cell that differ from test to test (workflow.py)
+
+LARGEST_ZERO = 0.03
+"""Standard deviation of the offset of a test, as a share of its peak, that is allowed for where nothing else is left.
+
+Reason: a cell of ten times the force, whose zero is good to 0.3 % of its range; not tuned."""
+ZEROS_LEAVE = 0.7
+"""Share of the gap that an offset of each test may leave, for the effects to be selected again with it.
+
+Reason: it takes half of the squares; the fit that it had bent takes the rest, or the first selection stands. Not tuned.
+"""
 
 # --- What counts as a gap, and when it contradicts a name (gap.py, verdict.py)
 

@@ -1,7 +1,7 @@
 """The verdict on a damper: `named`, `ambiguous`, `none` or `unexplained`, its reason, and how sure it is.
 
-`conclude` adopts what predicts held-out tests, decides, and looks for more effects where the gap has no name. Three
-cases have a verdict without a search: `insufficient_data`, no test that slips, and the knee law (`knee_verdict`).
+`judge` adopts what predicts held-out tests and decides; `conclude` looks for more effects where the gap has no name.
+Three cases have a verdict without a search: `insufficient_data`, no test that slips, and the knee law (`knee_verdict`).
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
-from pzd.diagnosis.search.determination import first_undetermined
+from pzd.diagnosis.search.determination import first_undetermined, varying_strengths
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
+from pzd.schema.errors import counted
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
@@ -51,10 +52,12 @@ class Decision:
     """Whether so much is not excluded that one more test is worth its time."""
 
 
-def conclude(
-    selection: Selection, validation: CrossValidation, config: DiagnoseConfig, unit: str
-) -> tuple[Adoption, Decision]:
-    """Decide which of the selected effects are adopted, and reach the verdict.
+Conclusion = tuple[Adoption, Decision]
+"""The effects that are adopted, and the verdict."""
+
+
+def judge(selection: Selection, validation: CrossValidation, config: DiagnoseConfig, unit: str) -> Conclusion:
+    """Decide which of the selected effects are adopted, and reach the verdict on them.
 
     Parameters
     ----------
@@ -77,6 +80,19 @@ def conclude(
         trend = nuisance_trend(selection.initial_evidence.campaign, adoption.selection.fitted.damper, config)
         if trend is not None:
             decision = Decision("unexplained", f"{decision.reason}; but {trend}", None)
+    return adoption, decision
+
+
+def conclude(judged: Conclusion, validation: CrossValidation, config: DiagnoseConfig) -> Conclusion:
+    """Look for more effects that predict where the gap has no name, and say what else may look like those adopted.
+
+    Parameters
+    ----------
+    judged : by `judge`
+    validation : cross-validation of the tests
+    config : thresholds, forced and forbidden effects
+    """
+    adoption, decision = judged
     if decision.verdict == "unexplained":
         extended = add_predictive_effects(adoption, validation, config)
         adoption = _polished(plain_unless_better(extended, validation, config.force))
@@ -149,6 +165,15 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     if odd and not selection.rivals:
         value = f"a value that no {' and no '.join(odd)} has"
         return Decision("unexplained", f"{change}; but with {value}, so that it is something that looks alike", None)
+    varying = varying_strengths(selection.final_evidence.whole, selection.fitted, config.significance)
+    if varying and not selection.rivals:
+        told = " and ".join(
+            f"{each.parameter} of {name} differs by {_percent(each.share)} from test to test (probability by noise "
+            f"alone {max(each.probability, 1e-300):.1g})"
+            for name, each in varying.items()
+        )
+        words = f"{change}; but {told}, so that it is something that looks alike"
+        return Decision("unexplained", words, None)
     better = [m for m in selection.competing_confounders if m.bic_difference < -config.rival_bic]
     if better:
         laws = [
@@ -168,7 +193,8 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
         told = [f"{others} would do as well on these tests"] if others else []
         told += [f"{name} with such values may be {other}" for other, name in called.items()]
         return Decision("ambiguous", f"{change}; {'; '.join(told)}", sure)
-    if possible := _likelier_alternatives(selection, config):
+    # A common offset or delay too: an effect is named here, and a reader would take it for all that is missing.
+    if possible := _likelier_alternatives(selection, config, ()):
         words = f"{change}{_not_excluded_note(selection, config)} beside it"
         sure = verdict_confidence(selection, config, possible)
         return Decision("ambiguous", words, sure, possible, doubtful=True)
@@ -219,7 +245,9 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
         return Decision(
             "unexplained", f"{gap} that repeats ({alone}); no effect of the library is supported by itself", None
         )
-    possible = tuple(dict.fromkeys((*selection.undecided, *_likelier_alternatives(selection, config))))
+    possible = tuple(
+        dict.fromkeys((*selection.undecided, *_likelier_alternatives(selection, config, thresholds.NUISANCE_EFFECTS)))
+    )
     if possible:
         words = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
         words = words or f"{gap}{_not_excluded_note(selection, config)}"
@@ -286,14 +314,21 @@ def not_excluded(selection: Selection, config: DiagnoseConfig) -> dict[str, Dete
     return {name: max(selection.open_detections[name], key=lambda each: each.size) for name in likely}
 
 
-def _likelier_alternatives(selection: Selection, config: DiagnoseConfig) -> tuple[str, ...]:
+def _likelier_alternatives(selection: Selection, config: DiagnoseConfig, beside: Collection[str]) -> tuple[str, ...]:
     """Return the effects that the tests do not exclude, where these together are likelier than the verdict.
 
-    An offset, a delay or a lag may be each test's own: whether these are open depends on their size, see `trivial`.
+    Where nothing is adopted an offset, a delay or a lag may be each test's own: whether these are open depends on their
+    size, see `trivial`.
+
+    Parameters
+    ----------
+    selection : effects adopted, and what was tried
+    config : which gaps count
+    beside : effects that may be there without being asked for
     """
-    if verdict_confidence(selection, config, thresholds.NUISANCE_EFFECTS) >= thresholds.LIKELIER_THAN_NOT:
+    if verdict_confidence(selection, config, beside) >= thresholds.LIKELIER_THAN_NOT:
         return ()
-    return tuple(name for name in not_excluded(selection, config) if name not in thresholds.NUISANCE_EFFECTS)
+    return tuple(name for name in not_excluded(selection, config) if name not in beside)
 
 
 def _not_excluded_note(selection: Selection, config: DiagnoseConfig) -> str:
@@ -571,6 +606,16 @@ def hold_out_note(hold_out: str) -> str:
         return ""
     parts = {"mixed": "some whole tests, and parts"}.get(hold_out, hold_out)
     return f"; held out were {parts} of tests that were also fitted, which is weak evidence"
+
+
+def alone_note(validation: CrossValidation) -> str:
+    """Say where a test that is kept back leaves none at its temperature, so that the others do not know it."""
+    prepared = validation.campaign.prepared
+    rows = {i: nearest_row(validation.baseline.base, p) for i, p in enumerate(prepared) if p.constant}
+    alone = sum([*rows.values()].count(row) == 1 and i not in validation.lone for i, row in rows.items())
+    if not alone:
+        return ""
+    return f"; {counted(alone, 'test')} kept back left none at the same temperature, and were predicted from the others"
 
 
 def no_prediction_note(prediction: Prediction | None) -> str:

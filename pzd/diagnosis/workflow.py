@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,42 +24,49 @@ from pzd.artefacts import (
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnosis import data, next_test
+from pzd.damper.parameter_rows import rows_per_voltage
+from pzd.diagnosis import data, next_test, thresholds
 from pzd.diagnosis.adoption import Adoption
-from pzd.diagnosis.campaign import Campaign, Evidence
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord
-from pzd.diagnosis.fit.least_squares import base_half_widths, fit, refit, standard_errors
+from pzd.diagnosis.fit.least_squares import base_half_widths, fit, polished, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.search.acceptance import Selection
+from pzd.diagnosis.search.determination import first_undetermined
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.support import support_of
 from pzd.diagnosis.verdict import (
+    Conclusion,
     Decision,
     Verdict,
+    alone_note,
     conclude,
     hold_out_note,
     insufficient_data,
     insufficient_data_diagnosis,
+    judge,
     knee_verdict,
     no_prediction_note,
     no_slip_diagnosis,
+    nuisance_trend,
     with_parts_told,
 )
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
-from pzd.identification.condition import parameter_row
+from pzd.identification.condition import misses, parameter_row
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales, stiffness_veto
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
 from pzd.schema.errors import counted
+from pzd.signals.measures import rms
 
 log = logging.getLogger(__name__)
 
@@ -92,9 +100,9 @@ def diagnose_setting(
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
-    validation = cross_validation_of(campaign, baseline, diagnose.visible)
-    selected = select_effects(campaign, baseline, diagnose, jobs)
-    adoption, decision = conclude(selected, validation, diagnose, control.unit)
+    judged = _with_zeros_of_tests(_judged(campaign, baseline, diagnose, control.unit), baseline, diagnose, control.unit)
+    campaign, validation = judged.campaign, judged.validation
+    adoption, decision = conclude(judged.conclusion, validation, diagnose)
     support = support_of(adoption, validation)
     decision = with_parts_told(decision, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
@@ -103,30 +111,117 @@ def diagnose_setting(
     limits = (
         hold_out_note(roles.hold_out),
         no_prediction_note(prediction),
+        alone_note(validation),
         data.saturation_note(saturated),
         data.drift_note(drift),
     )
-    final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
+    handed_on = fitted_to_all(adoption, validation, diagnose.force)
+    final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason="".join((decision.reason, campaign.budget.note, *limits, _hum(before))),
+        reason="".join((decision.reason, judged.zeros, campaign.budget.note, *limits, _hum(before))),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),
-        parameters=parameters_of(selection, control),
+        parameters=parameters_of(handed_on, control),
         prediction=prediction,
         zero_m=final.zero_m,
         support=support,
         left_of_peak=visible_gap(campaign.checks(selection.fitted.damper)),
-        ranking=ranking_of(selection, selection.initial_evidence),
+        ranking=ranking_of(handed_on, selection.initial_evidence),
         rivals=(*selection.rivals, *decision.possible),
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=_next_test(adoption, decision, final, zero, validation, recorded, envelope),
     )
     if selection.adopted:
-        rows = base_parameters(selection, decision.verdict, setting)
+        rows = base_parameters(handed_on, decision.verdict, setting)
     shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
     return Diagnosed(diagnosis, final, baseline, rows, shapes)
+
+
+def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:
+    """Select effects; with T0, C and k at each temperature where a law of the temperature turns out wrong.
+
+    The drift knows T0 and C alone. Where k follows the temperature too the gains of the tests do it in its place, or
+    something is left; what was measured at each temperature needs no law.
+    """
+    found = select_effects(campaign, baseline, config, jobs)
+    drifts = tuple(name for name in found.adopted if library()[name].place == "material" and name not in config.force)
+    if not drifts or len(baseline.base) == len(rows_per_voltage(baseline.base)):
+        return found
+    left, trend = found.final_evidence.gap(found.fitted), nuisance_trend(campaign, found.fitted.damper, config)
+    if trend is None and left < config.visible:
+        return found
+    forbidding = config.model_copy(update={"forbid": (*config.forbid, *drifts)})
+    by_rows = select_effects(campaign, baseline, forbidding, jobs, rows_by_temperature=True)
+    most = max(left, config.visible) if trend else thresholds.ROWS_INSTEAD * left
+    less = by_rows.final_evidence.gap(by_rows.fitted) <= most
+    return by_rows if less and nuisance_trend(campaign, by_rows.fitted.damper, config) is None else found
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A campaign, and what is judged of it."""
+
+    campaign: Campaign
+    validation: CrossValidation
+    conclusion: Conclusion
+    zeros: str = ""
+    """What the reason says of the zeros of the load cell."""
+
+
+def _judged(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+    """Select effects, and judge them."""
+    validation = cross_validation_of(campaign, baseline, config.visible)
+    selected = _selected(campaign, baseline, config, campaign.jobs)
+    return _Judged(campaign, validation, judge(selected, validation, config, unit))
+
+
+def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+    """Judge again where an offset of each test, larger than most stands have, takes much of what has no name.
+
+    A load cell is zeroed by hand, warms, or is made for ten times the force. No law gives a force that is constant in
+    every test and another one in each, so that such a gap names nothing of the damper. The first judgement stands where
+    nothing is explained by it.
+    """
+    campaign, (adoption, decision) = first.campaign, first.conclusion
+    if decision.verdict != "unexplained" or not config.nuisance.offset:
+        return first
+    damper, allowed = adoption.selection.fitted.damper, max(thresholds.LARGEST_ZERO, config.nuisance.offset)
+    checks = campaign.with_offset(allowed).checks(damper)
+    if visible_gap(checks) > thresholds.ZEROS_LEAVE * visible_gap(campaign.checks(damper)):
+        return first
+    zeros = np.array([float(np.mean(check.nuisances[check.wanted])) for check in checks])
+    spread = rms(zeros / np.array([check.peak for check in checks]))
+    wider = campaign.with_offset(float(np.clip(spread, config.nuisance.offset, allowed)))
+    again = _judged(wider, baseline, config, unit)
+    if again.conclusion[1].verdict == "unexplained":
+        return first
+    told = f"; the zero of the load cell differs from test to test, by {np.ptp(zeros):.2g} N in all"
+    return replace(again, zeros=told)
+
+
+def fitted_to_all(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Selection:
+    """Fit the adopted damper to every test, those too on which it was judged: what is handed on predicts the next one.
+
+    The plain damper is that of every test, and so is one that was fitted by criterion (4). Where an effect is not
+    determined by all of them, as in tests that contradict each other, the fit that was judged stays.
+
+    Parameters
+    ----------
+    adoption : the damper, fitted to what was not held out
+    validation : of every test
+    forced : effects that the config asks for, whatever they do
+    """
+    selection = adoption.selection
+    if not selection.adopted or adoption.by_criterion:
+        return selection
+    damper = selection.fitted.damper
+    whole = evidence_of(validation.campaign, damper).whole
+    fitted = polished(whole, refit(whole, damper))
+    if first_undetermined(whole, fitted, forced):
+        return selection
+    return replace(selection, fitted=fitted, final_evidence=replace(selection.final_evidence, whole=whole))
 
 
 def _hum(checks: Sequence[ResidualCheck]) -> str:
@@ -267,7 +362,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
         measured = np.concatenate([m for m, _ in mine])
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
-        scales = parameter_scales(parameters, widths, measured, whole.scales.speed).tolist()
+        scales = parameter_scales(parameters, widths, rms(measured), whole.scales.speed).tolist()
         stiffest = 1.0 / (scales[2] + float(widths[2])) if scales[2] <= widths[2] else np.inf
         evidence = [
             ParameterEvidence(name, scale, width, width, SHOWN, veto, doubt)
@@ -276,7 +371,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
             )
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)
-        rows.append(parameter_row(labels, parameters, widths, evidence, (measured, residuals), stiffest))
+        rows.append(parameter_row(labels, parameters, widths, evidence, misses(residuals, measured), stiffest))
     return tuple(rows)
 
 

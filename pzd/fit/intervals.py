@@ -75,6 +75,65 @@ def disagreement(slopes: Sequence[Array], residuals: Sequence[Array], whole: Arr
     return np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)
 
 
+def between_tests(
+    slopes: Sequence[Array], residuals: Sequence[Array], of: int, beforehand: Array
+) -> tuple[float, float]:
+    """Compute by how much a parameter differs from test to test, and how likely it is that chance alone makes it so.
+
+    Each test has a value of its own, all else is common to them.
+
+    Equation: Q = (x - m)' W (x - m), m = 1' W x / 1' W 1, W the weight matrix of the n values x, all else free;
+    s^2 = (Q - (n - 1)) / (tr W - 1' W W 1 / 1' W 1)
+            Source: Cochran 1954, Biometrics 10, 101; DerSimonian and Laird 1986, Controlled Clinical Trials 7, 177
+
+    Parameters
+    ----------
+    slopes, residuals : (n, p) and (n,) of each test at the optimum, in units of noise
+    of : the parameter
+    beforehand : (q, p) slopes of what is known of the parameters beforehand
+
+    Returns
+    -------
+    standard deviation of the parameter between tests, and the probability of as much by noise; 0 and 1 where fewer
+    than two tests show it
+
+    Examples
+    --------
+    Three tests with ten times as much noise-free slope, of which one stands apart:
+
+    >>> slopes, residuals = [np.array([[10.0]])] * 3, [np.array([x]) for x in (-10.0, 0.0, 10.0)]
+    >>> spread, chance = between_tests(slopes, residuals, 0, np.zeros((0, 1)))
+    >>> round(spread, 2), chance < 1e-40
+    (0.99, True)
+    """
+    from scipy.special import chdtrc
+
+    whole, left = np.concatenate([*slopes, beforehand]), np.concatenate([*residuals, np.zeros(len(beforehand))])
+    tests = [i for i, own in enumerate(slopes) if np.any(own[:, of])]
+    own = np.zeros((len(left), len(tests)))
+    ends = np.cumsum([0, *(len(each) for each in slopes)])
+    for column, i in enumerate(tests):
+        own[ends[i] : ends[i + 1], column] = slopes[i][:, of]
+    common = np.delete(whole, of, axis=1)
+    values = np.column_stack([own, left])
+    free = values - common @ np.linalg.lstsq(common, values, rcond=SINGULAR)[0]
+    own, left = free[:, :-1], free[:, -1]
+    weights = own.T @ own
+    inverse = inverse_normal(weights)
+    freedom = int(np.linalg.matrix_rank(inverse @ weights, tol=0.5)) - 1
+    if freedom < 1:
+        return 0.0, 1.0
+    estimates = -inverse @ (own.T @ left)
+    mean = np.sum(weights @ estimates) / np.sum(weights)
+    apart = estimates - mean
+    remaining = left + own @ estimates
+    noise = max(1.0, float(remaining @ remaining) / max(len(left) - whole.shape[1] - freedom, 1))
+    squares = float(apart @ weights @ apart) / noise
+    shown = float(np.trace(weights) - np.sum(weights @ weights) / np.sum(weights)) / noise
+    spread = float(np.sqrt(max(squares - freedom, 0.0) / shown))
+    return spread, float(chdtrc(freedom, squares))
+
+
 def widening(disagree: Array, squares: float, freedom: int) -> Array:
     """Return the factor (p,) on variances by noise alone: by what the fit leaves, or by what tests disagree.
 

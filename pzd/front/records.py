@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from os import PathLike, fspath
@@ -31,8 +31,9 @@ from pzd.quantities import (
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Limits
 from pzd.rig.preflight import PreflightRecord, examined
-from pzd.schema.errors import Advice, Advised, DataError
+from pzd.schema.errors import Advice, Advised, DataError, UserError
 from pzd.schema.yamlfile import document_of
+from pzd.schema.yamltree import compose
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -261,7 +262,7 @@ def read(
     Raises
     ------
     TypeError : when an argument is of the wrong type
-    ValueError : when no file matches, or one cannot be used; with every place
+    ValueError : when no file matches, or one cannot be used; with every place, and the call that the headers suggest
     """
     from pzd.rig.files.reading import read as read_files
 
@@ -273,8 +274,38 @@ def read(
         raise ValueError("path: no file is named (got an empty list)")
     signal = control_of(control)
     where = {"source": f"the path is seen from {Path.cwd()}"}
+    if configs := [fspath(one) for one in given if Path(one).suffix in (".yaml", ".yml")]:
+        raise ValueError(f"path: a config, and no rig file; pzd.run({configs[0]!r}) runs it (got {configs[0]!r})")
     entries = tuple(document_of({**where, **entry, "path": fspath(one)}).validated(FilesEntry, signal) for one in given)
-    return [Test.of(make()) for make in read_files(entries, Limits(), signal, Path())]
+    try:
+        return [Test.of(make()) for make in read_files(entries, Limits(), signal, Path())]
+    except DataError as error:
+        if entry or not (guess := _guessed_call(entries)):
+            raise
+        raise DataError([*error.messages, guess]) from None
+
+
+def _guessed_call(entries: Sequence[FilesEntry]) -> str:
+    """Return how files would be read by a guess from their headers, as a call to check; empty where nothing tells."""
+    from pzd.rig.config import matching
+    from pzd.rig.files.guess import guessed
+
+    paths = sorted({path for one in entries for path in matching(Path(), one.path)})
+    try:
+        lines = guessed(paths)
+    except UserError:
+        return ""
+    config = compose("\n".join(lines), Path(), DataError).data()
+    found = config["rig"]["files"]
+    named = [one.pop("path") for one in found]
+    keys = found[0]
+    if not keys or any(one != keys for one in found):
+        return ""
+    if "control" in config:
+        keys["control"] = tuple(config["control"].values())
+    path = repr(named[0] if len(named) == 1 else named)
+    call = ", ".join((path, *(f"{key}={value!r}" for key, value in keys.items())))
+    return f"as the headers suggest, to be checked and filled in where it says None: pzd.read({call})"
 
 
 def rig_of(tests: Any, limits: Limits, control: Control, called: str = "tests") -> Rig:

@@ -15,13 +15,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.artefacts import AuxiliaryRow, ParameterRow
+from pzd.fit.spread import NuisanceEquations, estimated_spread
 from pzd.identification import trust
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_evolutionary, fit_separable
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
+from pzd.identification.intervals import (
+    AS_BEFOREHAND,
+    VarianceSources,
+    half_widths,
+    interval_columns,
+    label_columns,
+    nuisance_equations_of,
+    uncertainty,
+    variance_sources,
+)
 from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare, split_by_record
 from pzd.identification.stiffness import OilSpring, oil_spring_alone, settle_stiffness
-from pzd.identification.trust import ParameterEvidence
+from pzd.identification.trust import ParameterEvidence, Reservation
 from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
 from pzd.signals.measures import criterion, rms
@@ -34,13 +44,33 @@ from pzd.signals.segmentation import separate_tests
 def identify_condition(
     condition: Condition, config: IdentifyConfig, seed: int
 ) -> tuple[ParameterRow, AuxiliaryRow | None]:
-    """Identify the Bingham parameters of one condition, and the forces that its tests show beside the element.
+    """Identify the Bingham parameters of one condition alone, and the forces that its tests show beside the element.
 
     Parameters
     ----------
     condition : whose records are fitted
     config : the method, and standard deviations of what differs from test to test
     seed : of the evolutionary search
+    """
+    estimate, auxiliary = estimate_condition(condition, config, seed)
+    (row,) = rows_of([estimate])
+    return row, auxiliary
+
+
+def estimate_condition(
+    condition: Condition, config: IdentifyConfig, seed: int
+) -> tuple[Estimate | ParameterRow, AuxiliaryRow | None]:
+    """Fit one condition; its intervals are given by `rows_of`, which sees the other conditions of the stand too.
+
+    Parameters
+    ----------
+    condition : whose records are fitted
+    config : the method, and standard deviations of what differs from test to test
+    seed : of the evolutionary search
+
+    Returns
+    -------
+    the estimate, or a row where that hangs on no other test; and the forces that the tests show beside the element
     """
     records = [test for record in condition.records for test in separate_tests(record)]
     whole = Objective(tuple(prepare(r) for r in one_at_a_time(records)))
@@ -50,8 +80,20 @@ def identify_condition(
     fit, stiffest = settle_stiffness(records, objective, fit, config.nuisance)
     by_record = objective.fitted_by_record(fit.parameters)
     fitted = fitted_records(records, objective.prepared, by_record, config.nuisance)
-    (row,) = parameter_rows(objective, [(condition.labels, fit.parameters)], fitted, stiffest=stiffest)
-    return row, None if auxiliary is None else _auxiliary_row(condition.labels, auxiliary)
+    estimate = estimate_of(objective, [(condition.labels, fit.parameters)], fitted, stiffest=stiffest)
+    return estimate, None if auxiliary is None else _auxiliary_row(condition.labels, auxiliary)
+
+
+def rows_of(estimates: Sequence[Estimate | ParameterRow]) -> list[ParameterRow]:
+    """Return the rows of the conditions of one stand, with intervals by how far all its tests differ.
+
+    Parameters
+    ----------
+    estimates : of its conditions; a row where that hangs on no other test
+    """
+    shown = [each.nuisances for each in estimates if isinstance(each, Estimate)]
+    spread = estimated_spread(shown) if shown else AS_BEFOREHAND
+    return [row for each in estimates for row in (each.rows(spread) if isinstance(each, Estimate) else [each])]
 
 
 def fit_with_auxiliary(
@@ -95,14 +137,80 @@ def _optimum(objective: Objective, config: IdentifyConfig, seed: int) -> Fit:
 # --- Rows ---
 
 
-def parameter_rows(
+@dataclass(frozen=True, eq=False)
+class FittedRow:
+    """The optimum of one row, and what speaks for and against it whatever its intervals."""
+
+    labels: Labels
+    parameters: Bingham
+    by_noise: Array
+    """(3,) half widths of the 95 % intervals of T0, C and 1/k by noise alone."""
+    energy: float
+    """Sum of F^2 over the samples on which it is judged [N2]."""
+    reserved: tuple[Reservation, ...]
+    missed: tuple[float, float]
+    """W_s and r.m.s. residual [N]."""
+    stiffest: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A fit of T0, C and k of one row or several, reduced to a few numbers a test; intervals are still to be given."""
+
+    optimum: tuple[FittedRow, ...]
+    sources: VarianceSources
+    nuisances: NuisanceEquations
+    """Of offset, gain and delay of every test."""
+    gram: Array
+    """(p, p) J'J of the force by T0, C and 1/k of every row."""
+    force_rms: float
+    speed: float
+    """Largest speed [m/s]."""
+
+    def rows(self, spread: Array = AS_BEFOREHAND) -> list[ParameterRow]:
+        """Return a row of the condition, or one a voltage node.
+
+        Parameters
+        ----------
+        spread : (3,) of offsets, gains and delays of the tests of this stand, as shares of their prior
+        """
+        widths = self.sources.half_widths(spread=spread).reshape(-1, 3)
+        scales = np.stack(
+            [
+                trust.parameter_scales(row.parameters, width, self.force_rms, self.speed)
+                for row, width in zip(self.optimum, widths, strict=True)
+            ]
+        )
+        shares = trust.partial_sensitivities(self.gram, scales.ravel(), 1.0).reshape(-1, 3)
+        return [_judged_row(*each) for each in zip(self.optimum, widths, scales, shares, strict=True)]
+
+
+def _judged_row(row: FittedRow, widths: Array, scales: Array, shares: Array) -> ParameterRow:
+    """Return a row judged by (3,) half widths of its intervals, scales, and forces that no other parameter replaces."""
+    sensitivities = shares / np.sqrt(row.energy)
+    evidence = [
+        ParameterEvidence(name, scale, by_noise, width, share, against.veto, against.doubt, against.shown)
+        for name, scale, by_noise, width, share, against in zip(
+            trust.PARAMETER_NAMES,
+            scales.tolist(),
+            row.by_noise.tolist(),
+            widths.tolist(),
+            sensitivities.tolist(),
+            row.reserved,
+            strict=True,
+        )
+    ]
+    return parameter_row(row.labels, row.parameters, widths, evidence, row.missed, row.stiffest)
+
+
+def estimate_of(
     objective: Objective,
     optimum: Sequence[tuple[Labels, Bingham]],
     records: Sequence[FittedRecord],
     touched: Mask | None = None,
     stiffest: float | None = None,
-) -> list[ParameterRow]:
-    """Return the rows of a fit: one of a condition, or one a voltage node.
+) -> Estimate:
+    """Collect what the rows of a fit need: one of a condition, or one a voltage node.
 
     Parameters
     ----------
@@ -114,23 +222,23 @@ def parameter_rows(
     """
     misfit = trust.misfit_of(records)
     noise = uncertainty([(r.slopes, r.residuals) for r in records]).half_widths().reshape(-1, 3)
-    widths = half_widths(records, misfit).reshape(-1, 3)
-    whole, speed = objective.measured, objective.scales[1]
-    scales = np.stack([trust.parameter_scales(p, w, whole, speed) for (_, p), w in zip(optimum, widths, strict=True)])
     gram = np.sum([r.slopes.T @ r.slopes for r in one_at_a_time(records)], axis=0)
     pull = np.sum([r.slopes.T @ r.residuals for r in one_at_a_time(records)], axis=0)
-    shares = trust.partial_sensitivities(gram, scales.ravel(), objective.energy).reshape(-1, 3)
     residuals = np.concatenate([r.residuals for r in one_at_a_time(records)])
     cosines = trust.stationarity(gram, pull, float(residuals @ residuals), objective.energy).reshape(-1, 3)
     rows = []
     for i, (labels, parameters) in enumerate(optimum):
         here = touched[:, i] if touched is not None and np.any(touched[:, i]) else slice(None)
-        measured, left = objective.measured[here], residuals[here]
-        share = shares[i] * np.sqrt(objective.energy / float(measured @ measured))
-        facts = np.stack([scales[i], noise[i], widths[i], share, cosines[i]])
-        evidence = trust.parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit, stiffest)
-        rows.append(parameter_row(labels, parameters, widths[i], evidence, (measured, left), stiffest))
-    return rows
+        measured, missed = objective.measured[here], misses(residuals[here], objective.measured[here])
+        reserved = trust.reservations(objective, parameters, missed[0], cosines[i], misfit, stiffest)
+        rows.append(FittedRow(labels, parameters, noise[i], float(measured @ measured), reserved, missed, stiffest))
+    sources, nuisances = variance_sources(records, misfit), nuisance_equations_of(records)
+    return Estimate(tuple(rows), sources, nuisances, gram, rms(objective.measured), objective.scales[1])
+
+
+def misses(residuals: Array, measured: Array) -> tuple[float, float]:
+    """Return W_s and the r.m.s. residual [N] of (N,) samples."""
+    return criterion(residuals, measured), rms(residuals)
 
 
 def parameter_row(
@@ -138,7 +246,7 @@ def parameter_row(
     parameters: Bingham,
     widths: Array,
     evidence: Sequence[ParameterEvidence],
-    fitted: tuple[Array, Array],
+    missed: tuple[float, float],
     stiffest: float | None = None,
 ) -> ParameterRow:
     """Return the row of one condition or node; an undetermined parameter has no number.
@@ -149,11 +257,10 @@ def parameter_row(
     parameters : the optimum
     widths : (3,) half widths of the 95 % intervals of T0, C and 1/k
     evidence : on T0, C and k
-    fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
+    missed : W_s and r.m.s. residual [N]
     stiffest : stiffness from which on the tests do not tell k from infinity [N/m], the lower end of its interval
     """
     status, determined = trust.trust_of(evidence)
-    measured, residuals = fitted
     cells = label_columns(labels)
     names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "positive", "inverse"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
@@ -162,7 +269,7 @@ def parameter_row(
             cells |= {**interval_columns(name, value, float(width), scale), name: None}
     if stiffest is not None and np.isfinite(stiffest):
         cells["k_N_per_m_low95"] = stiffest
-    cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": status}
+    cells |= {"W_s": missed[0], "rmse_N": missed[1], "status": status}
     return ParameterRow.model_validate(cells)
 
 
@@ -187,7 +294,7 @@ def _oil_spring_row(labels: Labels, spring: OilSpring, measured: Array) -> Param
         ParameterEvidence("k", compliance, float(noise[2]), float(widths[2]), shown),
     ]
     found = Bingham(spring.friction, 0.0, spring.stiffness)
-    row = parameter_row(labels, found, widths, evidence, (measured, residuals))
+    row = parameter_row(labels, found, widths, evidence, misses(residuals, measured))
     return row.model_copy(update={"T0_N_low95": spring.friction})
 
 

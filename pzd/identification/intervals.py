@@ -2,27 +2,28 @@
 
 Three sources move an estimate. Noise: the scatter between cycles that ought to be equal, or, where nothing repeats,
 between stretches of a record. Sensors: offset, gain and delay of the force differ from test to test, and no cycle
-shows it; their prior standard deviations are propagated through the fit and corrected by how far several tests
-disagree. Misfit: a lack of fit beyond noise (`pzd.identification.trust`), and in any case a hidden law too faint for
-any test, which C absorbs on a single sine. Were the tests repeated on the same damper with the sensors mounted anew,
-95 of 100 such intervals would hold the model's mean parameters. Where the model lacks nothing these are the damper's
-own; otherwise the status says that they are not.
+shows it; their prior standard deviations, or those that all tests of the rig show where these are smaller, are
+propagated through the fit and corrected by how far the tests of the fit disagree. Misfit: a lack of fit beyond noise
+(`pzd.identification.trust`), and in any case a hidden law too faint for any test, which C absorbs on a single sine.
+Were the tests repeated on the same damper with the sensors mounted anew, 95 of 100 such intervals would hold the
+model's mean parameters. Where the model lacks nothing these are the damper's own; otherwise the status says that they
+are not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pzd.fit.intervals import UNINFORMATIVE, inverse_normal, student_quantile
-from pzd.fit.spread import PRIOR_WORTH
+from pzd.fit.spread import PRIOR_WORTH, NuisanceEquations, nuisance_equations
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
 from pzd.parallel.on_disk import beside, one_at_a_time
-from pzd.record import Array, Labels
+from pzd.record import Array, Labels, Mask
 from pzd.signals.measures import reversals
 from pzd.signals.noise import Autoregression, all_pole, autoregression
 
@@ -30,6 +31,8 @@ TURNS_PER_STRETCH = 4
 """Reversals in a stretch of a record that does not repeat: two full cycles outlast the correlation of the noise."""
 STRETCH_COUNT = (4, 24)
 """Fewest and most stretches of one record."""
+AS_BEFOREHAND = np.ones(3)
+"""Spread of offset, gain and delay as the prior has it: no tests of the stand have shown a smaller one."""
 LEVERAGE_FLOOR = 1e-3
 """Least share of the residual that leverage leaves: a parameter that depends on one stretch alone leaves none there."""
 HIDDEN_FORCE = 5e-4
@@ -47,12 +50,55 @@ class _Variance:
     freedom: Array
 
 
-def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 0.95) -> Array:
-    """Compute the half widths of the two-sided intervals of a least-squares estimate.
+@dataclass(frozen=True, eq=False)
+class Pulls:
+    """Products of slopes, residuals and sensor errors of t tests, from which their pull on p parameters follows."""
 
-    Equation: V = sum_t w' (Z_t + L N_t) w + N m^2 B, w a row of B = (J'J)^-1, Z_t between cycles, N_t of the sensors,
-    m the force that the parameters may have absorbed; Student's t with the degrees of freedom of Satterthwaite
+    by_sensors: Array
+    """(t, p, 3) J_t' N_t, N_t the force by one prior standard deviation of offset, gain and delay."""
+    grams: Array
+    """(t, p, p) J_t' J_t."""
+    left: Array
+    """(t, p) J_t' r_t."""
+    bread: Array
+    """(p, p) B = (J'J)^-1."""
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceSources:
+    """Variance of p parameters by source, kept so that the spread of the sensors can still be chosen."""
+
+    size: Array
+    """(p,) size of the slopes, in units of which the variances are."""
+    unseen: Mask
+    """(p,) the parameters that the force does not depend on."""
+    noise: _Variance
+    pulls: Pulls
+    missed: Array
+    """(p,) variance by what the model misses, and by a hidden law that no test shows."""
+
+    def half_widths(self, level: float = 0.95, spread: Array = AS_BEFOREHAND) -> Array:
+        """Compute the half widths (p,) of the two-sided intervals, infinite where the force does not depend on it.
+
+        Equation: V = sum_t w' (Z_t + L N_t) w + N m^2 B, w a row of B = (J'J)^-1, Z_t between cycles, N_t of the
+        sensors, m the force that the parameters may have absorbed; Student's t with the degrees of freedom of
+        Satterthwaite
                                         Source: Liang and Zeger 1986; Satterthwaite 1946; L as in `_sensor_variance`
+
+        Parameters
+        ----------
+        level : of confidence
+        spread : (3,) of offsets, gains and delays on this stand, as a share of their prior
+        """
+        sensors = _sensor_variance(replace(self.pulls, by_sensors=self.pulls.by_sensors * spread), self.noise)
+        exact = np.full(self.size.size, np.inf)
+        together = _sum_of_variances([self.noise, sensors, _Variance(self.missed, exact)])
+        quantile = student_quantile(together.freedom, 0.5 + 0.5 * level)
+        return np.where(self.unseen, np.inf, quantile * np.sqrt(together.variance) / self.size)
+
+
+def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 0.95) -> Array:
+    """Compute the half widths of the two-sided intervals of a least-squares estimate, sensors as beforehand.
 
     Parameters
     ----------
@@ -64,6 +110,17 @@ def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 
     -------
     (p,) half widths, infinite for a parameter that the force does not depend on
     """
+    return variance_sources(records, misfit).half_widths(level)
+
+
+def variance_sources(records: Sequence[FittedRecord], misfit: Misfit) -> VarianceSources:
+    """Collect the variances of a least-squares estimate by noise, by the sensors, and by what the model misses.
+
+    Parameters
+    ----------
+    records : of the fit
+    misfit : of the model in them
+    """
     size = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in one_at_a_time(records)))
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
@@ -71,13 +128,16 @@ def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 
     grams = [s.T @ s for s in one_at_a_time(slopes)]
     bread = inverse_normal(np.sum(grams, axis=0))
     noise = _noise_variance(records, slopes, bread)
-    sensors = _sensor_variance(records, slopes, bread, noise)
+    pairs = list(zip(slopes, records, strict=True))
+    pulls = Pulls(
+        np.stack([s.T @ r.nuisances for s, r in one_at_a_time(pairs)]),
+        np.stack(grams),
+        np.stack([s.T @ r.residuals for s, r in one_at_a_time(pairs)]),
+        bread,
+    )
     samples = sum(r.residuals.size for r in records)
-    absorbed = misfit.absorbed**2 * samples * np.diag(bread) + _hidden_law_variance(records, slopes, bread)
-    together = _sum_of_variances([noise, sensors, _Variance(absorbed, np.full(size.size, np.inf))])
-    quantile = student_quantile(together.freedom, 0.5 + 0.5 * level)
-    widths: Array = quantile * np.sqrt(together.variance) / size
-    return np.where(unseen, np.inf, widths)
+    missed = misfit.absorbed**2 * samples * np.diag(bread) + _hidden_law_variance(records, slopes, bread)
+    return VarianceSources(size, unseen, noise, pulls, missed)
 
 
 def _sum_of_variances(terms: Sequence[_Variance]) -> _Variance:
@@ -166,9 +226,7 @@ def _degrees_of_freedom(matrix: Array) -> float:
 # --- Sensors ---
 
 
-def _sensor_variance(
-    records: Sequence[FittedRecord], slopes: Sequence[Array], bread: Array, noise: _Variance
-) -> _Variance:
+def _sensor_variance(tests: Pulls, noise: _Variance) -> _Variance:
     """Return the variance by offset, gain and delay of each test: by their priors, corrected by the disagreement.
 
     Equation: L = (n_0 + n R) / (n_0 + n), R = (sum_t u_t^2 - noise) / sum_t E u_t^2, n = tr(M)^2 / tr(M^2)
@@ -180,17 +238,14 @@ def _sensor_variance(
     100 intervals hold the truth for any number of tests. Were it as vague as its weight, n_0 + n, those of one test
     would be 1.4 times as wide and hold it in 99.
     """
-    count = len(bread)
-    given = [(s.T @ r.nuisances) for s, r in one_at_a_time(zip(slopes, records, strict=True))]
-    grams = [s.T @ s for s in one_at_a_time(slopes)]
-    pulls = np.stack([(s.T @ r.residuals) @ bread for s, r in one_at_a_time(zip(slopes, records, strict=True))])
-    prior = np.sum([(g.T @ bread) ** 2 for g in given], axis=(0, 1))
-    if len(records) < 2:
+    count, given = len(tests.bread), tests.by_sensors
+    pulls = tests.left @ tests.bread
+    prior = np.sum((given.transpose(0, 2, 1) @ tests.bread) ** 2, axis=(0, 1))
+    if len(given) < 2:
         return _Variance(prior, np.full(count, np.inf))
     variance, freedom = prior.copy(), np.full(count, np.inf)
-    whole = np.sum([g @ g.T for g in given], axis=0)
     for j in range(count):
-        covariance = _covariance_of_pulls(given, grams, bread, whole, j)
+        covariance = _covariance_of_pulls(tests, j)
         expected = float(np.trace(covariance))
         if expected <= UNINFORMATIVE * prior[j]:
             continue
@@ -201,16 +256,49 @@ def _sensor_variance(
     return _Variance(variance, freedom)
 
 
-def _covariance_of_pulls(given: Sequence[Array], grams: Sequence[Array], bread: Array, whole: Array, j: int) -> Array:
+def _covariance_of_pulls(tests: Pulls, j: int) -> Array:
     """Return the covariance (t, t) of the pulls of the tests on parameter j, after the fit has absorbed its share.
 
     Equation: u_t = w' z_t - w' G_t B sum_s z_s, z_t = J_t' (sensors of test t), G_t = J_t' J_t
     """
-    row = bread[j]
-    own = np.stack([g.T @ row for g in given])
-    shared = np.stack([bread @ (g @ row) for g in grams])
-    cross = np.stack([g @ o for g, o in zip(given, own, strict=True)]) @ shared.T
+    given, row = tests.by_sensors, tests.bread[j]
+    whole = np.sum(given @ given.transpose(0, 2, 1), axis=0)
+    own = np.einsum("tpk,p->tk", given, row)
+    shared = (tests.grams @ row) @ tests.bread
+    cross = np.einsum("tpk,tk->tp", given, own) @ shared.T
     return np.asarray(np.diag(np.sum(own**2, axis=1)) - cross - cross.T + shared @ whole @ shared.T)
+
+
+LEAST_NOISE = 1e-6
+"""Least noise that tests are weighed by, as a share of the peak force: beneath it is the rounding of a fit."""
+
+
+def nuisance_equations_of(records: Sequence[FittedRecord]) -> NuisanceEquations:
+    """Return the normal equations of offset, gain and delay of every test of a fit, its parameters eliminated.
+
+    Each test is weighed by the noise of what neither these nor the parameters explain. Samples beside a jump of the
+    force are left out.
+
+    Parameters
+    ----------
+    records : of the fit
+    """
+    own, shared, left = [], [], []
+    for record in one_at_a_time(records):
+        calm = record.calm[:, None]
+        columns = np.hstack([record.nuisances, record.slopes, record.residuals[:, None]]) * calm
+        size = np.linalg.norm(columns[:, :-1], axis=0)
+        basis = np.linalg.qr(columns[:, :-1][:, size > 0.0] / size[size > 0.0])[0]
+        rest = columns[:, -1] - basis @ (basis.T @ columns[:, -1])
+        noise, least = autoregression([rest], LARGEST_ORDER), LEAST_NOISE * float(np.max(np.abs(record.force)))
+        if noise.innovation < least**2:
+            noise = Autoregression(np.zeros(0), least**2)
+        white = noise.whitened(columns)
+        kinds = record.nuisances.shape[1]
+        own.append(white[:, :kinds])
+        shared.append(white[:, kinds:-1])
+        left.append(white[:, -1])
+    return nuisance_equations(own, shared, left)
 
 
 # --- Hidden law ---

@@ -279,7 +279,7 @@ def _status(
     values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array, *, converged: bool
 ) -> str:
     """Return `ok`, or the weak parameters with the reason; the gas is judged against the scale of the friction."""
-    least = {"friction_N": friction_scale(values["friction_N"], measured)}
+    least = {"friction_N": friction_scale(values["friction_N"], rms(measured))}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
     weak = [
         f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"

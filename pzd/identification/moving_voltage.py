@@ -22,7 +22,7 @@ from pzd.damper.motion import Motion, parts_of_steps
 from pzd.fit.least_squares import minimise
 from pzd.identification import bingham_fit
 from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
-from pzd.identification.condition import parameter_rows
+from pzd.identification.condition import estimate_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, Rows, conditions, voltage_scale
@@ -123,7 +123,7 @@ def _fit_band(
     by_record = split_by_record(prepared, residuals, slopes)
     fitted = fitted_records(objective.records, prepared, by_record, config.nuisance, constant=False)
     optimum, touched = list(zip(labels, free, strict=True)), objective.touched()[:, objective.free] > 0.0
-    return parameter_rows(objective.constant, optimum, fitted, touched)
+    return estimate_of(objective.constant, optimum, fitted, touched).rows()
 
 
 def _starting_values(objective: MovingObjective, band: float) -> list[Bingham]:
@@ -180,7 +180,9 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
 # --- Voltage nodes ---
 
 DWELL_SHARE = 0.05
-"""Least share of the samples at a level, in a band of 2 % of the scale of the voltage."""
+"""Least share of the samples at a level, in a band of 2 % of the scale of the voltage, or beyond the nodes."""
+BEYOND = 0.1
+"""Share of the range of the nodes by which a voltage lies well beyond them: closer, the last slope hardly changes."""
 
 
 def voltage_nodes(
@@ -189,7 +191,7 @@ def voltage_nodes(
     """Choose the nodes of the piecewise linear parameters, rising [V].
 
     The voltages of constant records are always nodes. The config may add others; where it does not and there are fewer
-    than two, the levels on which the voltage dwells are added.
+    than two, the levels on which the voltage dwells are added, and the ends of what it goes through beyond all these.
 
     Parameters
     ----------
@@ -210,11 +212,23 @@ def voltage_nodes(
     constant = _distinct_voltages(constant, apart)
     if chosen is not None and np.any(np.diff(np.sort(chosen)) <= apart):
         raise ConfigError(f"identify.nodes: two nodes are closer than {apart:g}; leave one out (got {list(chosen)})")
-    if chosen is None and len(constant) > 1:
-        return np.sort(constant)
     voltage = np.concatenate([r.voltage for r in moving if r.voltage is not None])
-    added = dwell_levels(voltage, apart) if chosen is None else chosen
+    added = chosen
+    if added is None:
+        added = [] if len(constant) > 1 else dwell_levels(voltage, apart)
+        added = [*added, *_ends_beyond(voltage, [*constant, *added])]
     return np.sort([*constant, *(v for v in added if all(abs(v - c) > apart for c in constant))])
+
+
+def _ends_beyond(voltage: Array, nodes: Sequence[float]) -> list[float]:
+    """Return the least and largest voltage where they lie well beyond the nodes, and so many samples that they count.
+
+    Beyond the outermost node all is constant, and what a ramp shows there would bend the nodes inside.
+    """
+    margin = BEYOND * (max(nodes) - min(nodes))
+    low, high = float(voltage.min()), float(voltage.max())
+    sides = ((low, voltage < min(nodes) - margin), (high, voltage > max(nodes) + margin))
+    return [end for end, beyond in sides if np.mean(beyond) >= DWELL_SHARE]
 
 
 def _distinct_voltages(voltages: Sequence[float], apart: float) -> list[float]:

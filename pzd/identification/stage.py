@@ -134,23 +134,28 @@ def _constant_rows(
     found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
 ) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
     """Identify the conditions, several at the same time where they are worth a process."""
-    from pzd.identification.condition import identify_condition
+    from pzd.identification.condition import Estimate, estimate_condition, rows_of
 
-    rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
+    Made = tuple[Estimate | ParameterRow, AuxiliaryRow | None, list[Cycles | None]]
+    estimates: list[Estimate | ParameterRow] = []
+    auxiliaries: list[AuxiliaryRow | None] = []
 
-    def fitted(number: int) -> tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]:
+    def fitted(number: int) -> Made:
         condition = found[number]
-        return *identify_condition(condition, config, seed + number), [cycles_of(r) for r in condition.records]
+        return *estimate_condition(condition, config, seed + number), [cycles_of(r) for r in condition.records]
 
-    def collected(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
-        row, auxiliary, runs = made
-        for record, run in zip(found[len(rows)].records, runs, strict=True):
+    def collected(made: Made) -> None:
+        estimate, auxiliary, runs = made
+        for record, run in zip(found[len(estimates)].records, runs, strict=True):
             remember_cycles(record, run)
-        rows.append((row, auxiliary))
-        progress(Progress(len(rows), len(found), f"conditions: {_parameter_text(row)}{_auxiliary_text(auxiliary)}"))
+        estimates.append(estimate)
+        auxiliaries.append(auxiliary)
+        (row,) = rows_of([estimate])
+        said = f"conditions: {_parameter_text(row)}{_auxiliary_text(auxiliary)}"
+        progress(Progress(len(estimates), len(found), said))
 
     parallel_map(fitted, range(len(found)), jobs, collected)
-    return rows
+    return list(zip(rows_of(estimates), auxiliaries, strict=True))
 
 
 def _moving_rows(

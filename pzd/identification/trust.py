@@ -13,7 +13,6 @@ from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
-from pzd.signals.measures import rms
 from pzd.signals.noise import pure_error, repeatable_power
 from pzd.signals.nuisance import NUISANCE_LIMIT, reducing_share
 
@@ -134,28 +133,38 @@ TARE = 0.3
 """Mean force, as a share of the r.m.s., above which a tare of the load cell is suggested."""
 
 
-def parameter_evidence(
+@dataclass(frozen=True)
+class Reservation:
+    """What speaks against T0, C or k whatever its interval."""
+
+    veto: str | None
+    """Reason why it is undetermined."""
+    doubt: str | None
+    """Reason why it is weak."""
+    shown: bool
+    """Whether a model without it is rejected."""
+
+
+def reservations(
     objective: Objective,
     parameters: Bingham,
     criterion: float,
-    facts: Array,
+    cosines: Array,
     misfit: Misfit,
     stiffest: float | None = None,
-) -> list[ParameterEvidence]:
-    """Collect the evidence on T0, C and k.
+) -> tuple[Reservation, ...]:
+    """Tell what speaks against T0, C and k whatever their intervals.
 
     Parameters
     ----------
     objective : the data
     parameters : the optimum
     criterion : W_s there
-    facts : (5, 3) scale, half width of the 95 % interval by noise alone and in all, partial sensitivity, and cosine of
-        stationarity of each
+    cosines : (3,) of stationarity
     misfit : of the model
     stiffest : stiffness from which on the tests do not tell k from infinity [N/m]; None where it was not looked for
     """
-    scales, noise, widths, visible, cosines = facts.tolist()
-    unsettled = _not_converged(objective, parameters, cosines)
+    unsettled = _not_converged(objective, parameters, cosines.tolist())
     vetoes = [
         f"at a bound of the search{_tare_hint(objective)}"
         if bounded
@@ -170,12 +179,8 @@ def parameter_evidence(
         vetoes[2] = veto
     else:
         doubts[2] = doubt or _noise_hides_stiffness(objective, parameters)
-    return [
-        ParameterEvidence(name, scale, by_noise, width, share, veto, why, shown=name == "k" and stiffest == np.inf)
-        for name, scale, by_noise, width, share, veto, why in zip(
-            PARAMETER_NAMES, scales, noise, widths, visible, vetoes, doubts, strict=True
-        )
-    ]
+    shown = [name == "k" and stiffest == np.inf for name in PARAMETER_NAMES]
+    return tuple(Reservation(*each) for each in zip(vetoes, doubts, shown, strict=True))
 
 
 def stiffness_veto(stiffest: float | None) -> str | None:
@@ -185,25 +190,25 @@ def stiffness_veto(stiffest: float | None) -> str | None:
     return f"above {stiffest:.2g} N/m, and these tests show no more of it"
 
 
-def friction_scale(friction: float, force: Array) -> float:
-    """Return the scale of T0 [N]."""
-    return max(friction, FRICTION_FLOOR * rms(force))
+def friction_scale(friction: float, force_rms: float) -> float:
+    """Return the scale of T0 [N], from it and the r.m.s. force [N]."""
+    return max(friction, FRICTION_FLOOR * force_rms)
 
 
-def parameter_scales(parameters: Bingham, widths: Array, measured: Array, speed: float) -> Array:
+def parameter_scales(parameters: Bingham, widths: Array, force_rms: float, speed: float) -> Array:
     """Return the scales (3,) of T0 [N], C [N s/m] and 1/k [m/N].
 
     Parameters
     ----------
     parameters : T0, C and k
     widths : (3,) half widths of their 95 % intervals
-    measured : (N,) force [N]
+    force_rms : of the tests [N]
     speed : largest of the tests [m/s]
     """
     friction, damping, stiffness = parameters
     may_be_none = damping <= widths[1] < np.inf
-    least = friction_scale(0.0, measured) / speed if may_be_none else 0.0
-    return np.array([friction_scale(friction, measured), max(damping, least), 1.0 / stiffness])
+    least = friction_scale(0.0, force_rms) / speed if may_be_none else 0.0
+    return np.array([friction_scale(friction, force_rms), max(damping, least), 1.0 / stiffness])
 
 
 def partial_sensitivities(gram: Array, scales: Array, energy: float) -> Array:

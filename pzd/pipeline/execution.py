@@ -14,7 +14,7 @@ from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefa
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
 from pzd.runs import Run, StageFolder
-from pzd.schema.errors import UserError
+from pzd.schema.errors import UserError, counted
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -115,10 +115,11 @@ class Pipeline:
         marks = self._carried(stage, self._untrusted(artefact))
         seconds = time.monotonic() - begun
         self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
-        if isinstance(artefact, Rig):
-            self._in_hand[stage.folder] = self.run.outputs(stage.folder), artefact.as_read()
         self.marks[stage.folder] = marks
         self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
+        if isinstance(artefact, Rig):
+            self._in_hand[stage.folder] = self.run.outputs(stage.folder), artefact.as_read()
+            self._say_findings(stage, artefact)
 
     def made(self, stage: Stage) -> Artefact:
         """Return what a stage makes of its inputs, written nowhere."""
@@ -180,6 +181,16 @@ class Pipeline:
         """Return a stage's own marks behind those of what it was made from."""
         before = [self.marks.get(kind.folder, ()) for kind in stage.takes.values() if is_artefact(kind)]
         return tuple(dict.fromkeys([mark for marks in before for mark in marks] + list(own)))
+
+    def _say_findings(self, stage: Stage, rig: Rig) -> None:
+        """Say how much the preflight finds, and what first: all later numbers are of these records."""
+        found = [(entry.name, finding) for entry in rig.entries for finding in entry.findings]
+        if found:
+            name, first = found[0]
+            such = f"{name}: {first.check}: {first.where}"
+            self._say(
+                stage, f"{counted(len(found), 'finding')}, {such}; pzd check {self.run.config} prints what follows"
+            )
 
     def _say(self, stage: Stage, line: str) -> None:
         self.say(f"{stage.name:<10} {line}")

@@ -139,7 +139,7 @@ def _quantities(changes: Changes, control: Control) -> TextTable:
     header = ("quantity", control.name, "before", "after", "95 % interval", "change", "in %", "share")
     listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
     rows = [row for each in listed_rows for row in _rows(each, control)]
-    title = "Each quantity before and after; those without a share did not change"
+    title = "Each quantity before and after; a share is that of all its values, and those without one did not change"
     return TextTable(title, *_without_control_where_none(header, rows))
 
 

@@ -39,13 +39,17 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
     name = row.name if row.name == row.parameter else f"{row.name} {row.parameter}"
     share = f", {100.0 * row.share:.3g} % of the difference" if hasattr(row, "share") else ""
     nodes = row.at_voltage_V or (None,)
+    if share and len(nodes) > 1:
+        yield f"{name} at {len(nodes)} control signals together{share}"
     for i, node in enumerate(nodes):
         start, to, low, high = (
             values[i] if isinstance(values, tuple) else values for values in (row.from_, row.to, row.low95, row.high95)
         )
         at = "" if node is None else f" at {TERMINAL.amount(node, control.unit)}"
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
-        yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{share}"
+        as_it_was = start is not None and low is not None and high is not None and low <= start <= high
+        told = (", as it was" if share and as_it_was else "") if len(nodes) > 1 else share
+        yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{told}"
 
 
 def course_lines(found: Course, control: Control) -> Iterator[str]:

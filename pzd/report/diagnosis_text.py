@@ -223,7 +223,7 @@ def next_test_line(test: NextTest, unit: str) -> str:
     peaks = ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
     reached = [_number(value, of) for value, of in peaks if value is not None]
     far = f", up to {' and '.join(reached)}" if reached else ""
-    aim = f" to tell {' from '.join(test.separates)}" if test.separates else ""
+    aim = f" to tell {' from '.join(test.separates)}" if test.separates else " to settle what these tests leave open"
     if test.between_voltage_V is not None:
         low, high = (_number(voltage) for voltage in test.between_voltage_V)
         aim = f", since between {low} and {high} {unit} the force is known least"

@@ -28,7 +28,7 @@ from pzd.config import RunConfig, load
 from pzd.quantities import Control
 from pzd.schema.validate import read_json
 
-CASES = 60
+CASES = 40
 NEVER_SCORED = 20261121
 """One of the seeds that rules are tuned on, so that no scored one is used up."""
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "blind-motions.yaml"
@@ -61,7 +61,7 @@ def test_a_small_benchmark_names_what_is_there(pzd: Command, root: Path, tmp_pat
     assert [case.failure for case in cases if case.failure] == [], said.stdout
 
     seen = [c for c in cases if c.kind == "single" and c.truth and visible(c) and not c.one_frequency]
-    assert len(seen) >= 12
+    assert len(seen) >= CASES // 5, "too few to say anything of rates"
     assert (Rate.of(seen, right).share or 0.0) >= 0.75, said.stdout
     assert Rate.of(seen, wrong_name).hits <= 2, said.stdout
     assert Rate.of([c for c in cases if c.kind == "none"], false_name).hits <= 1, said.stdout
@@ -75,7 +75,8 @@ def test_what_is_hidden_is_named_and_nothing_else(
 ) -> None:
     seed, case, hidden = MENDED[fault]
     tuning = "true" if seed < FIRST_SCORED else "false"
-    config = load(CONFIG, [f"blind.seed={seed}", f"blind.tuning={tuning}"])
+    # Dampers near that of the config, on which these faults showed.
+    config = load(CONFIG, [f"blind.seed={seed}", f"blind.tuning={tuning}", "blind.base_spread=0.1"])
     setup, files = setup_of(config), CaseFiles(tmp_path)
     (planned,) = (each for each in plan(setup.blind) if each.id == case)
     hide(setup, replace(planned, hidden=hidden), files)  # what a plan hides there moves with the library

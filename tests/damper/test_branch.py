@@ -69,6 +69,24 @@ def test_beyond_its_shelf_a_branch_dissipates_four_times_its_force_times_the_sli
     assert lost(motion, force) == pytest.approx(4.0 * SLIPS * (amplitude - 1.0) * SHELF, rel=1e-5)
 
 
+@pytest.mark.parametrize("branch", ["second_branch", "bouc_wen"])
+@pytest.mark.parametrize("alpha", [-0.6, 0.1, 0.6])
+def test_a_damper_that_is_harder_in_one_direction_is_so_in_its_branches_too(branch: str, alpha: float) -> None:
+    """A third of the friction in a branch: both directions differ by 2 alpha of the whole, not of two thirds of it."""
+    values = {"second_branch": {"T0_2": 150.0, "k_2": 5e4}, "bouc_wen": {"F_h": 150.0, "x_h": 2e-3, "sigma": 1.0}}
+    damper = PLAIN.with_effect(branch, values[branch])
+    uneven = damper.with_effect("asymmetry", {"alpha": alpha})
+    v = np.array([-0.4, -0.1, -1e-3, 1e-3, 0.1, 0.4])
+    expected = (1.0 + alpha * np.sign(v)) * steady_force(damper, 0.0, None, v)
+    np.testing.assert_allclose(steady_force(uneven, 0.0, None, v), expected, rtol=1e-9)
+    motion = sine(0.04, frequency=0.02)
+    slipping = np.abs(motion.displacement) < 0.5 * 0.04
+    slipping[: motion.time.size // 3] = False
+    even = respond(damper, motion)[slipping]
+    factor = 1.0 + alpha * np.sign(motion.velocity[slipping])
+    np.testing.assert_allclose(respond(uneven, motion)[slipping], factor * even, rtol=1e-4)
+
+
 def test_a_small_amplitude_distinguishes_a_branch_from_a_rounded_yield_and_a_lash() -> None:
     """Inside the shelf a rounded yield loses as much as its speed says, and behind a lash nothing pulls at all."""
     motion = sine(0.9 * SHELF)

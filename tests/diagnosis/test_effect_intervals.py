@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import damper_of, sine
+from synthetic import all_but, damper_of, diagnosed, sine, sines
 
 from pzd.damper.effects import library
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
@@ -142,3 +142,15 @@ def test_a_delay_of_the_tests_does_not_pass_for_more_or_less_play(rng: np.random
     # Delays of 2.4 standard deviations are drawn towards zero by their prior: not by more than the interval allows.
     assert delta == pytest.approx(1.5e-4, rel=0.02)
     assert abs(float(delta) - 1.5e-4) < LEVEL * standard_errors(found)[0]
+
+
+def test_t0_c_and_k_of_tests_that_repeat_are_as_near_as_all_of_them_show(rng: np.random.Generator) -> None:
+    """Four tests a level that have no gain of their own, two of them held out for the verdict alone."""
+    truth = damper_of(orifice_quadratic={"q": 1500.0})
+    tests = ((1.0, 0.02), (3.0, 0.02), (2.0, 0.03), (2.0, 0.01))
+    records = sines(truth, rng, tests=tests, noise=0.002, colour=0.0)
+    found = diagnosed(records, forbid=all_but("orifice_quadratic"))
+    assert found.diagnosis.effects == ("orifice_quadratic",)
+    for row, true in zip(found.damper.base, truth.base, strict=True):
+        found_row, true_row = ([each.T0_N, each.C_Ns_per_m, each.k_N_per_m] for each in (row, true))
+        assert found_row == pytest.approx(true_row, rel=0.002)

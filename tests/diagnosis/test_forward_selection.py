@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -271,3 +272,28 @@ def test_the_values_of_a_forced_effect_are_found_again(name: str, rng: np.random
     fitted = found.fitted.damper.effects[name]
     for parameter, value in values.items():
         assert fitted[parameter] == pytest.approx(value, rel=WITHIN[name]), (parameter, values, fitted)
+
+
+@pytest.mark.ci
+def test_an_effect_is_named_where_the_oil_spring_follows_the_temperature_as_no_drift_does(
+    rng: np.random.Generator,
+) -> None:
+    """T0 and C have a law of the temperature and k has none: the gains of the tests had to follow it in its place."""
+    records = []
+    for degC, a, b, c in ((20.0, 1.0, 1.0, 1.0), (60.0, 0.852, 0.67, 0.961)):
+        rows = tuple(
+            BaseRow(voltage_V=U, T0_N=a * T0, C_Ns_per_m=b * C, k_N_per_m=c * k)
+            for U, T0, C, k in (
+                (0.0, 180.0, 1700.0, 3.5e5),
+                (40.0, 507.0, 1933.0, 4.17e5),
+                (80.0, 807.0, 2167.0, 4.83e5),
+                (120.0, 1080.0, 2400.0, 5.5e5),
+            )
+        )
+        damper = Damper(base=rows, effects={"lash": {"delta": 3e-4}})
+        voltages, tests = [row.voltage_V for row in rows], ((1.0, 0.02), (4.0, 0.008))
+        made = sines(damper, rng, voltages, tests=tests, noise=0.004, colour=0.0, displacement_noise=3e-6)
+        records += [replace(r, name=f"{r.name}-{degC:g}", temperature=np.full(r.time.size, degC)) for r in made]
+    told = diagnosed(records).diagnosis
+    assert (told.verdict, told.effects) == ("named", ("lash",)), told.reason
+    assert told.parameters["lash"]["delta"].value == pytest.approx(3e-4, rel=0.02)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from pzd.diagnosis.search.acceptance import has_come_down_to, rivals_of
 from pzd.diagnosis.search.candidates import candidate, converged
 from pzd.diagnosis.search.determination import nearly_others
 from pzd.diagnosis.search.forward_selection import reweighted, swap_step
+from pzd.record import Record
 
 ONE_STROKE = ((0.5, 0.02), (2.0, 0.02))
 SEVERAL = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -174,3 +176,26 @@ def test_a_pocket_is_searched_to_the_end_of_its_valley_where_the_weights_change(
     for parameter, error in zip(("d_c", "F_c"), errors, strict=True):
         true = truth.effects["cavitation"][parameter]
         assert abs(found.damper.effects["cavitation"][parameter] - true) < 3.5 * error < 0.5 * true
+
+
+def test_what_rubber_gives_is_no_gas_spring_of_one_rate(rng: np.random.Generator) -> None:
+    """A spring behind a dashpot (Maxwell): a spring and more damping, of another size at each frequency."""
+    row = BaseRow(voltage_V=0.0, T0_N=110.0, C_Ns_per_m=170.0, k_N_per_m=6.6e5)
+    frequencies, stiffness, relaxation = (0.5, 2.0), 150.0, 0.3
+    tests = tuple((f, x) for f in frequencies for x in (0.01, 0.02))
+    settings = {"noise": 2e-3, "colour": 0.0, "cycles": 10, "tests": tests}
+    only = {"forbid": all_but("gas_spring", "preload_offset")}
+    plain = sines(Damper(base=(row,)), rng, (0.0,), **settings)
+
+    def beside(record: Record, f: float) -> Record:
+        s = 2.0 * np.pi * f * relaxation
+        rubber = stiffness * (s * s * record.displacement + relaxation * record.velocity) / (1.0 + s * s)
+        return replace(record, force=record.force + rubber)
+
+    rubber = [beside(record, f) for record, (f, _) in zip(plain, tests, strict=True)]
+    told = diagnosed(rubber, **only).diagnosis
+    assert told.verdict == "unexplained", told.reason
+    assert "k_g of gas_spring differs by" in told.reason
+    spring = Damper(base=(row,), effects={"gas_spring": {"k_g": 150.0}})
+    told = diagnosed(sines(spring, rng, (0.0,), **settings), **only).diagnosis
+    assert (told.verdict, told.effects) == ("named", ("gas_spring",)), told.reason

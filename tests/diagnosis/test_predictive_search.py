@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+import numpy as np
 import pytest
+from synthetic import campaign_of, damper_of, sine
 
-from pzd.diagnosis.predictive_search import Tried, loses_between
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.cross_validation import cross_validation_of
+from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, Tried, _Proposal, as_good, loses_between
 from pzd.fit.cross_validation import PredictionError
 
 ENERGY = 1e4
@@ -38,3 +42,60 @@ def test_a_step_may_lose_between_voltages_less_than_it_gains_and_never_what_the_
 ) -> None:
     plain = errors(0.02, 0.0185).interpolation_error
     assert loses_between(errors(0.012, 0.0080), errors(held_out, between), plain) is loses
+
+
+@pytest.mark.parametrize(
+    ("voltages", "good"),
+    [
+        ((0.0040, 0.0060), True),  # as before
+        ((0.0038, 0.0060), True),
+        ((0.0010, 0.0080), False),  # less in all, and at one voltage more
+        ((0.0052, 0.0050), False),
+    ],
+)
+def test_fewer_parameters_do_as_well_where_nothing_is_lost_at_any_voltage(
+    voltages: tuple[float, float], *, good: bool
+) -> None:
+    def of(pair: tuple[float, float]) -> PredictionError:
+        entries = [(criterion * ENERGY, ENERGY, ENERGY, 1e-4 * ENERGY) for criterion in np.repeat(pair, 4)]
+        return PredictionError.of_entries(range(8), entries)
+
+    class TwoVoltages:
+        @staticmethod
+        def worse_at(one: PredictionError, other: PredictionError) -> tuple[float, ...]:
+            tests = (0.0, range(4)), (1.0, range(4, 8))
+            return tuple(v for v, i in tests if other.of_records(list(i)).visibly_below(one.of_records(list(i))))
+
+    assert as_good(of(voltages), of((0.0040, 0.0060)), cast("Any", TwoVoltages())) is good
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "taken"),
+    [
+        ("gas_spring", {"k_g": 1000.0}, True),
+        ("accumulator", {"F_g": 300.0, "L": 0.1}, False),
+        ("accumulator", {"F_g": 6e4, "L": 20.0}, False),
+    ],
+)
+def test_two_forces_that_cancel_at_their_optimum_are_no_step(
+    effect: str, values: dict[str, float], *, taken: bool, rng: np.random.Generator
+) -> None:
+    """A gas as long as twenty metres is a spring, beside a preload of tens of kilonewtons that takes its force back."""
+    plain = damper_of((0.0,))
+    preloaded = plain.with_effect("preload_offset", {"F_0": 150.0})
+    true = preloaded.with_effect("gas_spring", {"k_g": 4000.0})
+    records = tuple(sine(true, 0.0, f, x, rng) for f, x in ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03)))
+    config = DiagnoseConfig()
+    validation = cross_validation_of(campaign_of(records), plain, config.visible)
+    here, further = (
+        validation.fit_by_criterion(damper, validation.no_samples)
+        for damper in (preloaded, preloaded.with_effect(effect, values))
+    )
+    assert here is not None
+    assert further is not None
+    damper = here[1].damper
+    errors = validation.error_by_criterion(damper), validation.interpolation_error(damper, by_criterion=True)
+    search = PredictiveSearch(validation, config, most_effects=6)
+    found = search._best(CriterionFit(*here, *errors), [_Proposal.of(*further, validation)])
+    assert (found is not None) is taken
+    assert search.off == (set() if taken else {effect})

@@ -6,6 +6,8 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, 
 
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import shown_force
@@ -23,7 +26,7 @@ from pzd.diagnosis.search.acceptance import Detection, detections
 from pzd.diagnosis.search.candidates import candidates
 from pzd.diagnosis.support import parts
 from pzd.diagnosis.thresholds import LIKELIER_THAN_NOT
-from pzd.diagnosis.verdict import Decision, NuisanceTrend, nuisance_trend, with_parts_told
+from pzd.diagnosis.verdict import Decision, NuisanceTrend, Verdict, _hints, nuisance_trend, with_parts_told
 from pzd.record import Array, Record, sliced
 
 TESTS = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.03))
@@ -430,3 +433,25 @@ def test_a_little_of_another_law_of_the_same_place_may_be_how_the_first_one_real
     found = with_parts_told(named, support)
     assert found.verdict == said
     assert (found.reason == named.reason) == (said == "named")
+
+
+@pytest.mark.parametrize(
+    ("voltage", "adopted", "rivals", "verdict", "words"),
+    [
+        (None, {"rounded_yield": {"w_s": 0.01}}, (), "unexplained", "identify.law: auto tries the knee law"),
+        (0.0, {"rounded_yield": {"w_s": 0.01}}, (), "unexplained", ""),
+        (None, {"rounded_yield": {"w_s": 0.01}}, (), "named", ""),
+        (0.0, {"valve_lag": {"tau": 0.09}}, ("piezo_hysteresis",), "ambiguous", "at rates farther apart tells a lag"),
+        (0.0, {"valve_lag": {"tau": 0.09}}, (), "named", ""),
+    ],
+)
+def test_a_verdict_says_what_else_looks_alike_and_what_would_tell(
+    voltage: float | None, adopted: dict[str, dict[str, float]], rivals: tuple[str, ...], verdict: Verdict, words: str
+) -> None:
+    row = BaseRow(voltage_V=voltage, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6)
+    fitted = SimpleNamespace(damper=Damper(base=(row,), effects=adopted))
+    selection = SimpleNamespace(fitted=fitted, adopted=tuple(adopted), rivals=rivals)
+    adoption = cast("Adoption", SimpleNamespace(selection=selection))
+    said = "; ".join(_hints(adoption, Decision(verdict, "", None)))
+    assert words in said
+    assert bool(said) == bool(words)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
-from pzd.fit.intervals import covariance, disagreement, inverse_normal, student_quantile, widening
+from pzd.fit.intervals import between_tests, covariance, disagreement, inverse_normal, student_quantile, widening
 
 
 def test_the_covariance_of_a_line_is_that_of_the_textbook() -> None:
@@ -53,3 +56,36 @@ def test_quantiles_are_those_of_the_cauchy_and_the_normal_distribution_at_the_en
     assert student_quantile(1.0, 0.975) == pytest.approx(np.tan(0.475 * np.pi))
     assert student_quantile(0.1, 0.975) == student_quantile(1.0, 0.975)
     assert student_quantile(np.inf, 0.975) == pytest.approx(1.959964, abs=1e-6)
+
+
+def test_a_mean_that_differs_from_test_to_test_does_so_by_the_moments_of_dersimonian_and_laird() -> None:
+    # Two tests of n samples each, means d apart: Q = n d^2 / 2, s^2 = (Q - 1) / n; chi-square of one degree of freedom.
+    n, d = 8, 1.5
+    slopes, residuals = [np.ones((n, 1))] * 2, [np.full(n, d / 2.0), np.full(n, -d / 2.0)]
+    spread, chance = between_tests(slopes, residuals, 0, np.zeros((0, 1)))
+    Q = n * d**2 / 2.0
+    assert spread == pytest.approx(np.sqrt((Q - 1.0) / n))
+    assert chance == pytest.approx(math.erfc(np.sqrt(Q / 2.0)))
+
+
+def test_the_spread_between_tests_is_found_beside_what_they_share_and_noise_alone_shows_none(
+    rng: np.random.Generator,
+) -> None:
+    """Over 300 rigs of five tests: probabilities by chance are uniform, and squares of the spread right on average."""
+
+    def found(apart: float) -> tuple[float, float]:
+        slopes = [rng.standard_normal((40, 3)) for _ in range(5)]
+        residuals = [rng.standard_normal(40) + apart * rng.standard_normal() * own[:, 1] for own in slopes]
+        shared = np.linalg.lstsq(np.concatenate(slopes), -np.concatenate(residuals), rcond=None)[0]
+        at_optimum = [r + own @ shared for own, r in zip(slopes, residuals, strict=True)]
+        return between_tests(slopes, at_optimum, 1, np.zeros((0, 3)))
+
+    chances = np.array([found(0.0)[1] for _ in range(300)])
+    assert kstest(chances, "uniform").pvalue > 1e-3
+    spreads = np.array([found(0.5)[0] for _ in range(300)])
+    assert np.sqrt(np.mean(spreads**2)) == pytest.approx(0.5, rel=0.1)
+
+
+def test_one_test_alone_cannot_differ_from_others(rng: np.random.Generator) -> None:
+    slopes = [rng.standard_normal((30, 2)), np.column_stack([rng.standard_normal(30), np.zeros(30)])]
+    assert between_tests(slopes, [rng.standard_normal(30)] * 2, 1, np.zeros((0, 2))) == (0.0, 1.0)

@@ -216,12 +216,29 @@ def test_files_are_named_by_a_path_a_pattern_or_a_list(rig_files: Path) -> None:
         ("*.csv", {"colums": {}}, ValueError, "did you mean columns"),
         ("*.csv", {"sign": {"force": 2}}, ValueError, "sign.force"),
         ("*.csv", {"columns": pd.DataFrame()}, TypeError, "columns"),
+        ("quickstart.yaml", {}, ValueError, r"pzd\.run\('quickstart\.yaml'\) runs it"),
     ],
 )
 def test_a_mistake_in_reading_is_told(path, keys, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words) as told:
         pzd.read(path, **keys)
     assert "rig.files" not in str(told.value)
+
+
+def test_headers_that_a_guess_understands_are_refused_with_the_call_that_reads_them(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    arrays = sine()
+    for warm in (72, 104):
+        rows = zip(arrays["time"], 1e3 * arrays["displacement"], arrays["force"], strict=True)
+        text = "".join(f"{t:.6g},{x:.6g},{f:.6g}\n" for t, x, f in rows)
+        (tmp_path / f"run_{warm}F.csv").write_text(f"time_s,Stroke [mm],Load [N]\n{text}", encoding="utf-8")
+    for paths in ("*.csv", ["run_72F.csv", "run_104F.csv"]):
+        with pytest.raises(ValueError, match="as the headers suggest") as told:
+            pzd.read(paths)
+        call = str(told.value).rpartition("None: ")[2]
+        tests = eval(call)  # the advice is followed to the letter
+        assert sorted(test.record.median_temperature() for test in tests) == pytest.approx([22.22, 40.0], abs=0.01)
+        assert max(test.displacement.max() for test in tests) == pytest.approx(arrays["displacement"].max(), rel=1e-5)
 
 
 # ---------------------------------------------------------------- stages

@@ -13,16 +13,21 @@ from fresh_truths import SENSORS_ALIKE, TABLE_2, sine_test, with_noise
 from pzd.artefacts import ParameterRow
 from pzd.fit.intervals import student_quantile
 from pzd.identification.bingham_fit import Bingham
-from pzd.identification.condition import fit_with_auxiliary, identify_condition
+from pzd.identification.condition import Estimate, estimate_condition, fit_with_auxiliary, identify_condition, rows_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, uncertainty
 from pzd.identification.prepared_record import FittedRecord, fitted_records
 from pzd.identification.trust import Misfit, misfit_of
 from pzd.record import Array, Condition, Record
 from pzd.signals.cycles import cycles
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import NO_NUISANCE, NuisanceConfig
 
 COLUMNS = ("T0_N", "C_Ns_per_m", "k_N_per_m")
+
+
+def row_of(estimate: Estimate) -> ParameterRow:
+    (row,) = rows_of([estimate])
+    return row
 
 
 def row_for(records: Sequence[Record], config: IdentifyConfig = SENSORS_ALIKE) -> ParameterRow:
@@ -199,6 +204,40 @@ def test_a_misfit_that_the_status_reports_widens_no_interval_any_further() -> No
     assert some.absorbed == pytest.approx(2.0 * little.absorbed)
     assert much.absorbed == pytest.approx(some.absorbed)
     assert Misfit(0.0, 0.0).absorbed == 0.0
+
+
+def rigs(draw: np.random.Generator, sensors: NuisanceConfig) -> tuple[list[Bingham], list[Estimate]]:
+    """The dampers and the fits of six conditions of a rig, two sines each."""
+    found = [campaign(each, "two sines", noise=2e-3, sensors=sensors) for each in draw.spawn(6)]
+    made = [
+        estimate_condition(Condition(None, float(level), None, records), IdentifyConfig(), seed=1)[0]
+        for level, (_, records) in enumerate(found)
+    ]
+    return [truth for truth, _ in found], [each for each in made if isinstance(each, Estimate)]
+
+
+def test_what_repeats_over_the_conditions_of_a_rig_is_believed_of_each(rng: np.random.Generator) -> None:
+    """Two tests of a condition cannot tell that the sensors repeat, twelve of six can."""
+    truths, estimates = rigs(rng, NO_NUISANCE)
+    together, alone = rows_of(estimates), [row_of(each) for each in estimates]
+    for row, single in zip(together, alone, strict=True):
+        assert row.T0_N == single.T0_N
+        assert row.T0_N_high95 - row.T0_N_low95 < 0.4 * (single.T0_N_high95 - single.T0_N_low95)
+    assert sum(map(held, together, truths)) >= 16  # of 18
+
+
+@pytest.mark.ci
+def test_intervals_hold_the_truth_where_the_conditions_of_a_rig_tell_how_far_its_sensors_spread(
+    rng: np.random.Generator,
+) -> None:
+    # Binomial, 180 at 0.95: sd 1.6 %; those of one rig hang together.
+    for share in (0.3, 1.0):
+        spread = NuisanceConfig(**{name: share * value for name, value in NuisanceConfig()})
+        found = 0
+        for draw in rng.spawn(10):
+            truths, estimates = rigs(draw, spread)
+            found += sum(map(held, rows_of(estimates), truths))
+        assert found >= 0.90 * 180
 
 
 GAIN = NuisanceConfig().gain

@@ -111,7 +111,16 @@ def test_dwell_levels_are_those_of_a_staircase_and_the_ends_of_a_ramp() -> None:
 
 
 def test_two_constant_voltages_are_the_nodes_whatever_moves() -> None:
-    np.testing.assert_array_equal(voltage_nodes([moving_test(ramp)], [140.0, 20.0], None, 150.0), [20.0, 140.0])
+    np.testing.assert_array_equal(voltage_nodes([moving_test(ramp)], [145.0, 10.0], None, 150.0), [10.0, 145.0])
+
+
+def test_the_nodes_reach_as_far_as_the_voltage_moves() -> None:
+    """A staircase to 100 V beside ramps to 150 V: the table ended at 100 V, and the damper was 5 % off above."""
+    staircase = moving_test(lambda time: 50.0 * np.floor(np.mod(time, 3.0)))
+    found = voltage_nodes([moving_test(ramp), staircase], [], None, 150.0)
+    assert found == pytest.approx([0.0, 50.0, 100.0, 150.0], abs=1.0)
+    beside = voltage_nodes([moving_test(ramp)], [0.0, 75.0], None, 150.0)
+    assert beside == pytest.approx([0.0, 75.0, 150.0], abs=1.0)
 
 
 def test_node_weights_sum_to_one_and_are_constant_beyond_the_ends() -> None:

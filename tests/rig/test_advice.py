@@ -305,6 +305,21 @@ def test_the_advice_of_a_finding_is_accepted(tmp_path: Path) -> None:
     assert run(tmp_path, {"path": "a.csv", "columns": {"velocity": ""}}).entries[0].findings == ()
 
 
+def test_a_tare_that_changed_is_taken_out_as_advised(tmp_path: Path) -> None:
+    """Four tests of one speed, the load cell loaded in one of them: an entry of its own takes the tare out."""
+    for name in ("a", "b", "c", "d"):
+        write(tmp_path / f"{name}.csv", lines(WITHOUT | {"force_N": FORCE + 150.0 * (name == "d")}))
+    offsets = [f for entry in run(tmp_path).entries for f in entry.findings if f.check == "offset"]
+    (told,) = offsets
+    assert told.size == pytest.approx(150.0, rel=0.1)
+    assert "tare" in told.follows
+    assert "fixture" in told.follows
+    apart = {"path": "d.csv", "fixture": {"tare_N": 150.0}}
+    mended = run(tmp_path, {"path": "[abc].csv"}, apart)
+    assert not [f for entry in mended.entries for f in entry.findings if f.check == "offset"]
+    assert np.allclose(mended.records[3].force, mended.records[0].force)
+
+
 def test_numbers_beyond_all_measure_are_refused_without_a_warning(tmp_path: Path) -> None:
     """Their products overflow, and what numpy says of that would stand on the screen."""
     with warnings.catch_warnings():

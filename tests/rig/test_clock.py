@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -119,7 +120,11 @@ def test_numbers_of_samples_are_no_seconds(tmp_path: Path) -> None:
 def test_a_jump_of_a_day_is_refused_at_once_and_read_where_it_is_cut(tmp_path: Path) -> None:
     time = np.where(TIME < 0.5, TIME, TIME + 86400.0)
     write(tmp_path / "a.csv", lines({"time_s": [f"{t:.3f}" for t in time], **WITHOUT_TIME}))
+    tracemalloc.start()
     (said,) = refused(tmp_path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 50e6  # B; the day on the grid of the samples took 8 GB
     assert "a.csv:252: the clock jumps by 86400 s here, in a record of 0.996 s beside" in said
     (gap,) = re.findall(r"split: \{gap_s: ([0-9.]+)\}", said)
     assert len(run(tmp_path, {"path": "a.csv", "split": {"gap_s": float(gap)}}).records) == 2

@@ -178,20 +178,29 @@ def test_a_rate_above_the_header_stands_for_a_column_of_time(tmp_path: Path, sai
 
 
 @pytest.mark.parametrize("above", [[], ["Test frequency: 5 Hz"], ["Generated at 5 Hz"]])
-def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str]) -> None:
-    path = stored(tmp_path / "a.csv", [*above, "Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
-    text = guessed([path])
-    assert any("or say rate_Hz: N instead" in line for line in text)
-    assert not any(line.strip().startswith("rate_Hz") for line in text)
+@pytest.mark.parametrize("numbered", [False, True])
+def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str], numbered: bool) -> None:
+    """Numbers of the rows are no time."""
+    head, columns = "Stroke (mm);Load (N)", [numbers(MM), numbers(FORCE)]
+    if numbered:
+        head, columns = f"Sample;{head}", [numbers(np.arange(TIME.size)), *columns]
+    text = "\n".join(guessed([stored(tmp_path / "a.csv", [*above, head], columns, ";")]))
+    asked = "rate_Hz:   # fill in: samples a second"
+    assert asked in text
+    assert "Sample" not in text
+    (tmp_path / "guess.yaml").write_text(text.replace(asked, "rate_Hz: 500  #"), encoding="utf-8")
+    config = load(tmp_path / "guess.yaml")
+    (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
+    assert record.time == pytest.approx(np.arange(TIME.size) / 500.0)
 
 
-def test_files_that_tell_several_rates_are_no_files_of_one(tmp_path: Path) -> None:
+def test_files_that_tell_several_rates_are_read_each_by_its_own(tmp_path: Path) -> None:
     columns = [numbers(MM), numbers(FORCE)]
     paths = [
         stored(tmp_path / f"{rate}.csv", [f"Sample rate: {rate} Hz", "Stroke (mm);Load (N)"], columns, ";")
         for rate in (500, 1000)
     ]
-    assert not any(line.strip().startswith("rate_Hz") for line in guessed(paths))
+    assert {record.time[1] for record in read_back(tmp_path, paths).records} == {1.0 / 500, 1.0 / 1000}
 
 
 def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:
@@ -212,6 +221,10 @@ def test_instants_are_read_by_the_format_of_the_first_row(tmp_path: Path) -> Non
             tmp_path / f"{number}.csv", ["Zeit,Weg [mm],Kraft [N]"], [stamps, numbers(MM), numbers(FORCE)], ","
         )
         assert np.abs(read_back(tmp_path, [path]).records[0].time - TIME).max() < 1e-6
+        path = stored(
+            tmp_path / f"when{number}.csv", ["Wann,Weg [mm],Kraft [N]"], [stamps, numbers(MM), numbers(FORCE)], ","
+        )
+        assert np.abs(read_back(tmp_path, [path], {"time": "Wann"}).records[0].time - TIME).max() < 1e-6
 
 
 def test_names_of_files_tell_the_control_and_the_work_the_sign(tmp_path: Path) -> None:
@@ -428,6 +441,10 @@ def test_a_file_that_is_no_test_of_a_damper_is_told_what_it_is(tmp_path: Path) -
     assert "levels over frequency, as of third octaves" in world_of(tmp_path, lines(bands))
     telemetry = {"Time [s]": TIME, "Damper Pos FL [mm]": X, "Damper Pos FR [mm]": X, "Speed [km/h]": X}
     assert "without force no damper: this file has Time [s], Damper Pos FL [mm]" in world_of(tmp_path, lines(telemetry))
+    velocity = {"Time [s]": TIME, "Velocity [m/s]": X, "Force [N]": FORCE}
+    told = world_of(tmp_path, lines(velocity))
+    assert "without displacement no damper: this file has Time [s], Velocity [m/s], Force [N]" in told
+    assert "write the integral of the velocity" in told
 
 
 def test_no_column_is_offered_for_two_quantities_and_units_are_asked_in_the_same_round(tmp_path: Path) -> None:

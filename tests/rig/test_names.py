@@ -34,6 +34,8 @@ NUMBERS: dict[str, tuple[str, float, dict[str, Any]]] = {
     "sine_-20C": ("temperature", -20.0, {"units": {"temperature": "degC"}}),
     "temp-7C_b": ("temperature", -7.0, {"units": {"temperature": "degC"}}),
     "run-20C": ("temperature", 20.0, {"units": {"temperature": "degC"}}),
+    "run_104F": ("temperature", 40.0, {"units": {"temperature": "degF"}}),
+    "run_50degF": ("temperature", 10.0, {"units": {"temperature": "degF"}}),
 }
 
 
@@ -49,7 +51,7 @@ def test_a_number_in_a_name_is_guessed_whole_and_with_its_sign(tmp_path: Path, n
     (tmp_path / "guess.yaml").write_text("\n".join(guessed([tmp_path / f"{name}.csv"])), encoding="utf-8")
     config = load(tmp_path / "guess.yaml")
     (entry,) = ingest(config.rig, config.control.signal(), tmp_path).entries
-    assert (entry.voltage_V if quantity == "voltage" else entry.temperature_degC) == value
+    assert (entry.voltage_V if quantity == "voltage" else entry.temperature_degC) == pytest.approx(value)
 
 
 @pytest.mark.parametrize(

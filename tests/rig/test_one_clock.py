@@ -193,6 +193,7 @@ def test_channels_without_a_common_time_are_refused(tmp_path: Path) -> None:
     mdf(tmp_path / "a.mf4", [[("Stroke", one, motion(one)[0], "m")], [("Load", two, force_at(two), "N")]])
     (said,) = refused(tmp_path, {"path": "a.mf4"} | NAMED)
     assert "'Load' begins at 5 s, when 'Stroke' has ended (1.999 s): they have no time in common" in said
+    assert "table: NAME" not in said  # no table holds both
 
 
 def test_two_recordings_in_two_groups_stay_two_tests(tmp_path: Path) -> None:

@@ -10,7 +10,9 @@ from stepped_motions import NO_STEPS, STEPS, TIME, sine
 from test_preflight import record
 from written_files import lines, refused, run, write
 
+from pzd.artefacts import Finding, RecordEntry
 from pzd.record import Array
+from pzd.rig.preflight.force import drop_contradicting_delays
 
 
 def damper(x: Array, gas: float = 0.0) -> Array:
@@ -171,3 +173,20 @@ def test_displacement_and_force_exchanged_are_told_as_such(tmp_path: Path, rng: 
     exchanged = {"columns": {"displacement": "Kraft [N]", "force": "Weg [mm]"}}
     units = {"units": {"displacement": "mm", "force": "N"}}
     assert len(run(tmp_path, {"path": "a.csv"} | exchanged | units).records) == 1
+
+
+@pytest.mark.parametrize(("asked", "left"), [("sss", 3), ("ss.", 2), ("s...", 0), ("r...", 1)])
+def test_a_delay_that_most_tests_of_its_kind_do_not_ask_for_is_a_law_that_is_missing(asked: str, left: int) -> None:
+    """A mount that slips asked for a quarter of a second in two sines of fifteen; a road shows what no sine does."""
+
+    def entry(number: int, kind: str) -> RecordEntry:
+        told = Finding(check="delay", where="the whole record", size=0.02, unit="s", follows="not corrected")
+        wide = 4.0 if kind == "r" else 1.0
+        return RecordEntry(
+            name=str(number), setting=None, voltage_V=None, temperature_degC=None, rate_Hz=500.0, cycles=8.0,
+            displacement_rms_m=0.01, velocity_rms_m_per_s=0.1, acceleration_rms_m_per_s2=wide,
+            findings=() if kind == "." else (told,),
+        )  # fmt: skip
+
+    entries = tuple(entry(*each) for each in enumerate(asked))
+    assert sum(len(one.findings) for one in drop_contradicting_delays(entries)) == left

@@ -96,7 +96,7 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
     """Draw a pair; None where its motions are not those that are asked for."""
     rng = default_rng(SeedSequence(seed, spawn_key=(index, 43)))
     run = stand.campaign(str(rng.choice(CAMPAIGNS)), rng)
-    base, actuator = BinghamTable.drawn(run.values, rng), stand.Actuator.drawn(rng)
+    actuator = stand.Actuator.drawn(rng)
     equal = kind != "changed" or rng.random() < 2.0 / 3.0
     if only is not None and equal != (only == "equal"):
         return None
@@ -104,12 +104,10 @@ def pair(seed: int, index: int, kind: str, only: str | None = None) -> Pair | No
         run, tests=tuple(replace(t, frequency=1.25 * t.frequency, amplitude=0.85 * t.amplitude) for t in run.tests)
     )  # fmt: skip
     phases = int(rng.integers(1 << 31))
-
-    def driven(campaign: stand.LaboratoryCampaign) -> list[stand.Driven]:
-        return [stand.driven(campaign, t, actuator, default_rng([phases, i])) for i, t in enumerate(campaign.tests)]
-
-    motions, others = driven(run), driven(other)
-    coarse = [stand.driven(run, t, actuator, default_rng([phases, i]), True) for i, t in enumerate(run.tests)]
+    base, run = case.drawn_base(run, actuator, phases, rng)
+    other = replace(other, step=run.step)
+    motions, others = (case.driven_tests(each, actuator, phases) for each in (run, other))
+    coarse = case.driven_tests(run, actuator, phases, coarse=True)
     plain = case.HiddenDamper(base, {}, 22.0)
     scale = case._scale(run, base, coarse, [plain.force(m, None) for m in coarse])
     outside = tuple(str(n) for n in rng.choice(list(OUTSIDE), int(rng.integers(1, 3)), replace=False))

@@ -32,6 +32,8 @@ SLOWEST = 5.0
 """Longest time that a file or unit may take beyond that of the whole file, read by a fresh child [s]."""
 LARGEST = 1e9
 """Most memory that may be taken beyond that of the start [bytes]."""
+_READERS = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+"""Files of text are read here, those of a library in a child."""
 ALPHABET = "mNkg VsA/*^()[].,0123456789-+e\"'%\u00b0\u00b5 about the mean of first x10"
 """What a unit may be made of."""
 
@@ -106,7 +108,7 @@ def main() -> int:
             written(folder / file)
             originals[name] = (file, (folder / file).read_bytes(), entry)
         usual = {"unit": 0.0} | {name: whole(folder, *original) for name, original in originals.items()}
-        started = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        started = {who: resource.getrusage(who).ru_maxrss for who in _READERS}
         while time.monotonic() - begun < asked.seconds:
             rng = np.random.default_rng([asked.seed, number])
             name = list(originals)[number % len(originals)]
@@ -131,7 +133,7 @@ def main() -> int:
                 bad.append(f"seed {asked.seed}, trial {number}, {name}: {outcome}, {took:.1f} s")
             counts[outcome if outcome in ("read", "refused") else "fault"] += 1
             number += 1
-    grown = 1024.0 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - started)
+    grown = 1024.0 * max(resource.getrusage(who).ru_maxrss - begun_with for who, begun_with in started.items())
     if grown > LARGEST:
         bad.append(f"memory grew by {grown / 1e9:.2f} GB")
     sys.stdout.write("\n".join([*bad, f"{number} trials: {dict(counts)}, memory grew by {grown / 1e6:.0f} MB", ""]))

@@ -27,12 +27,13 @@ from scipy.stats import qmc
 
 from pzd.artefacts import ParameterRow, Rig
 from pzd.blind.independent import stand
+from pzd.blind.independent.damper_space import GROWTH, bingham_levels, log_between
 from pzd.blind.independent.kernel import plain_force
 from pzd.blind.independent.stand import Actuator, Driven, LaboratoryCampaign, LaboratoryTest, MotionKind
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.stage import diagnose
 from pzd.identification.bingham_fit import Bingham, Objective, descend
-from pzd.identification.condition import parameter_rows
+from pzd.identification.condition import estimate_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.prepared_record import fitted_records, prepare
 from pzd.identification.stage import identify
@@ -55,12 +56,6 @@ MOST_SAMPLES = 25_000
 """In all tests of a case, unless said otherwise, so that one takes seconds; what is beyond is not run."""
 SAMPLES_A_CYCLE = 40.0
 """Least number: fewer are refused."""
-LIMIT_SHARE = 0.12
-"""Share of the cases at either end of an axis that ends in a limit."""
-STIFFEST, SOFTEST = 1e-6, 0.2
-"""T0/k over the stroke."""
-QUICKEST, SLOWEST = 1e-6, 0.05
-"""C/k [s]."""
 COARSEST = 0.01
 """Largest resolution of the displacement, as a share of the stroke."""
 COLUMNS = ("T0_N", "C_Ns_per_m", "k_N_per_m")
@@ -108,16 +103,6 @@ class Case:
         )
 
 
-def log_between(share: float, low: float, high: float) -> float:
-    """Return a number at a share of the way on a logarithmic scale."""
-    return float(low * (high / low) ** share)
-
-
-def with_ends(share: float) -> float:
-    """Return a share whose ends 0 and 1 have a weight of their own."""
-    return float(np.clip((share - LIMIT_SHARE) / (1.0 - 2.0 * LIMIT_SHARE), 0.0, 1.0))
-
-
 def drawn(seed: int, count: int, most_samples: int = MOST_SAMPLES) -> list[Case]:
     """Draw the cases."""
     points = qmc.Sobol(16, seed=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
@@ -134,20 +119,12 @@ def case(number: int, u: Sequence[float], rng: Generator, most_samples: int) -> 
     values = tuple(float(v) for v in np.linspace(0.0, 10.0, levels)) if levels > 1 else (0.0,)
     tests = _tests(rng, each, amplitude, (slowest, rate), values, most_samples)
     speed = max(2.0 * np.pi * t.frequency * t.amplitude for t in tests)
-    peak, share = log_between(u[5], 50.0, 2e4), with_ends(u[6])
-    friction, damping = share * peak, (1.0 - share) * peak / speed
-    gain, growth = (1.0 + 3.0 * u[9] if levels > 1 else 1.0), rng.uniform(-0.2, 0.5, 2)
     stroke = 2.0 * min(t.amplitude for t in tests)
-    stiffness = _stiffness(gain * friction, 1.5 * damping, stroke, u[7], u[14] < 0.5, u[8])
-    courses = np.linspace(0.0, 1.0, levels)
+    of_damper = [u[i] for i in (5, 6, 7, 8, 9, 14)]
+    rows = bingham_levels(of_damper, rng.uniform(*GROWTH, 2).tolist(), levels, speed, stroke)
     return Case(
         number,
-        tuple(
-            Bingham(
-                friction * (1.0 + (gain - 1.0) * s), damping * (1.0 + growth[0] * s), stiffness * (1.0 + growth[1] * s)
-            )
-            for s in courses
-        ),
+        tuple(Bingham(*row) for row in rows.tolist()),
         LaboratoryCampaign(tuple(tests), values, rate),
         log_between(u[10], 2e-4, 0.03),
         0.9 * u[11],
@@ -180,19 +157,6 @@ def _tests(
     samples = np.cumsum([t.seconds * rate for t in every])
     fits = int(np.searchsorted(samples, most_samples))
     return every[: max(len(values) * (fits // len(values)), len(values))]
-
-
-def _stiffness(friction: float, damping: float, stroke: float, rigid: float, by_friction: bool, share: float) -> float:
-    """Return k by T0/k over the least stroke or by C/k, neither beyond what a damper has."""
-    if rigid < LIMIT_SHARE:
-        return np.inf
-    softest = max(friction / (stroke * SOFTEST), damping / SLOWEST)
-    wanted = (
-        friction / (stroke * log_between(share, STIFFEST, SOFTEST))
-        if (by_friction and friction > 0.0) or damping == 0.0
-        else damping / log_between(share, QUICKEST, SLOWEST)
-    )
-    return float(max(wanted, softest))
 
 
 # --- Its records ---
@@ -354,7 +318,7 @@ def _needless(case_: Case, rig: Rig, rows: Sequence[ParameterRow], settings: Ide
         by_record = objective.fitted_by_record(fit.parameters)
         fitted = fitted_records(condition.records, objective.prepared, by_record, settings.nuisance)
         optimum = [(condition.labels, fit.parameters)]
-        (reference,) = parameter_rows(objective, optimum, fitted, stiffest=stiffest)
+        (reference,) = estimate_of(objective, optimum, fitted, stiffest=stiffest).rows()
         yield from (name for name in ("T0", "C") if name in _doubted(row) and name not in _doubted(reference))
 
 

@@ -79,6 +79,7 @@ def plants(records: Sequence[Record], share: float) -> Mapping[str, Mapping[str,
         "accumulator": {"F_g": force, "L": 3.0 * stroke},
         "second_branch": {"T0_2": force, "k_2": force / (0.1 * stroke)},
         "bouc_wen": {"F_h": force, "x_h": 0.1 * stroke, "sigma": 1.0},
+        "asymmetry": {"alpha": share},
     }
 
 
@@ -90,7 +91,9 @@ def planted(records: Sequence[Record], name: str, values: Mapping[str, float]) -
     found = []
     for r in records:
         motion = Motion(r.time, r.displacement, r.velocity, r.acceleration)
-        added = respond(damper, motion, 0.0) - respond(nothing, motion, 0.0)
+        # what scales the damper's own force by its direction has none by itself
+        scaled = values.get("alpha", 0.0) * np.abs(r.force)
+        added = scaled + respond(damper, motion, 0.0) - respond(nothing, motion, 0.0)
         found.append(replace(r, force=r.force + added))
     return found
 

@@ -51,7 +51,7 @@ from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import promised_drop
 from pzd.diagnosis.search.forward_selection import select_effects
-from pzd.diagnosis.verdict import conclude
+from pzd.diagnosis.verdict import conclude, judge
 from pzd.identification.stage import identify
 from pzd.record import mid_stroke
 from pzd.rig.config import FilesEntry, RigConfig
@@ -206,7 +206,7 @@ def searched(case: Case, config: DiagnoseConfig, *, checked: bool) -> Searched:
 
 def answered(found: Searched, config: DiagnoseConfig) -> Answer:
     """What is said of a search."""
-    handed, decision = conclude(found.selection, found.validation, config, "V")
+    handed, decision = conclude(judge(found.selection, found.validation, config, "V"), found.validation, config)
     return decision.verdict, frozenset(handed.selection.adopted), frozenset(handed.selection.rivals)
 
 

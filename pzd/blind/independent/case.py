@@ -6,12 +6,13 @@ A hidden law is as strong as leaves a drawn visible gap, which is measured here 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 
 from pzd.blind.independent import stand
+from pzd.blind.independent.damper_space import elastic_levels
 from pzd.blind.independent.kernel import BinghamTable, Parameters, integrated
 from pzd.blind.independent.laws import LAWS, Scale, delayed_force, drift_factor, lagged_signal, signal_with_play
 from pzd.blind.independent.outside import OUTSIDE
@@ -130,6 +131,46 @@ def _heat_capacity(motions: Sequence[Driven], forces: Sequence[Array], rise: flo
 # --- The case ---
 
 
+STEPS_OF_SPRING = 8.0
+"""Least steps of the integration in C/k, which laws of the flow shorten."""
+FINEST = 4.0
+"""Most steps in place of one of the longest: what is stiffer than these follow is not drawn with a law hidden in it."""
+
+
+def driven_tests(run: LaboratoryCampaign, actuator: Actuator, phases: int, *, coarse: bool = False) -> list[Driven]:
+    """Return the motion of every test of a campaign.
+
+    Parameters
+    ----------
+    run : the campaign
+    actuator : how demands are followed
+    phases : seed of the phases of tones and random motions
+    coarse : steps four times as long, for a first look
+    """
+    return [stand.driven(run, t, actuator, default_rng([phases, i]), coarse) for i, t in enumerate(run.tests)]
+
+
+def drawn_base(
+    run: LaboratoryCampaign, actuator: Actuator, phases: int, rng: Generator
+) -> tuple[BinghamTable, LaboratoryCampaign]:
+    """Draw T0, C and k for the motions of a campaign, and return it with steps that follow them.
+
+    Parameters
+    ----------
+    run : the campaign
+    actuator : how demands are followed
+    phases : seed of the phases of tones and random motions
+    rng : of the damper
+    """
+    motions = driven_tests(run, actuator, phases, coarse=True)
+    speed = max(float(np.max(np.abs(m.velocity))) for m in motions)
+    stroke = min(float(np.ptp(m.displacement)) for m in motions)
+    rows = elastic_levels(rng, len(run.values), speed, stroke, STEPS_OF_SPRING * run.step / FINEST)
+    step = min(run.step, float(np.min(rows[:, 1] / rows[:, 2])) / STEPS_OF_SPRING)
+    T0, C, k = (tuple(float(v) for v in row) for row in rows.T)
+    return BinghamTable(run.values, T0, C, k), replace(run, step=step)
+
+
 LEAST_DRIFT_RISE = 4.0
 """A damper whose drift is hidden warms by at least so much [K], or the drift could not be seen."""
 
@@ -146,12 +187,10 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
     """
     rng = default_rng(SeedSequence(seed, spawn_key=(index, 2)))
     run = stand.campaign(campaign_name, rng)
-    base, actuator = BinghamTable.drawn(run.values, rng), Actuator.drawn(rng)
+    actuator = Actuator.drawn(rng)
     phases = int(rng.integers(1 << 31))
-    fine, coarse = (
-        [stand.driven(run, t, actuator, default_rng([phases, i]), rough) for i, t in enumerate(run.tests)]
-        for rough in (False, True)
-    )
+    base, run = drawn_base(run, actuator, phases, rng)
+    fine, coarse = (driven_tests(run, actuator, phases, coarse=rough) for rough in (False, True))
     start, rise = float(rng.uniform(18.0, 26.0)), float(np.exp(rng.uniform(np.log(0.5), np.log(8.0))))
     drifts = "temperature_drift" in hidden
     heated = drifts or rng.random() < 0.3
@@ -194,6 +233,7 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
 def _scale(run: LaboratoryCampaign, base: BinghamTable, motions: Sequence[Driven], forces: Sequence[Array]) -> Scale:
     return Scale(
         force=max(float(np.max(np.abs(f))) for f in forces),
+        friction=max(base.T0),
         speed=max(float(np.max(np.abs(m.velocity))) for m in motions),
         stroke=max(float(np.max(np.abs(m.displacement))) for m in motions),
         acceleration=max(float(np.percentile(np.abs(m.acceleration), 99)) for m in motions),
@@ -333,7 +373,7 @@ def _refit(
         rows = [_residual(m, f, _constant(m, start, z), known) for m, f in own]
         return np.asarray(np.nan_to_num(np.clip(np.concatenate(rows), -_ASTRAY, _ASTRAY), nan=_ASTRAY))
 
-    low, high = np.array([-6.0, -3.0, -3.0]), np.array([3.0, 3.0, 3.0])
+    low, high = np.array([-6.0, -6.0, -3.0]), np.array([3.0, 6.0, 3.0])
     friction, damping = _line_through(own)
     step = float(own[0][0].time[2] - own[0][0].time[0])
     stiffness = min(start[2], damping / step)  # the integration follows C/k of a step and more

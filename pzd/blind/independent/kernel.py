@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 
 from pzd.blind.independent import laws, outside
 from pzd.compiled import compiled
@@ -32,17 +31,6 @@ class BinghamTable:
     """[N s/m]"""
     k: tuple[float, ...]
     """[N/m]"""
-
-    @classmethod
-    def drawn(cls, values: tuple[float, ...], rng: Generator) -> BinghamTable:
-        """Draw a damper for anything between a seat and a lorry."""
-        T0, C, k = (float(np.exp(rng.uniform(*np.log(span)))) for span in ((40, 400), (800, 6000), (1.5e5, 2e6)))
-        share = np.linspace(0.0, 1.0, len(values)) ** float(rng.uniform(0.7, 1.3))
-        gain = float(rng.uniform(1.5, 5.0))
-        friction = T0 * (1.0 + (gain - 1.0) * share)
-        damping = C * (1.0 + float(rng.uniform(-0.3, 0.6)) * share)
-        stiffness = k * (1.0 + float(rng.uniform(-0.2, 0.5)) * share)
-        return cls(values, *(tuple(float(v) for v in row) for row in (friction, damping, stiffness)))
 
     def at(self, signal: Array) -> tuple[Array, Array, Array]:
         """Return (n,) T0, C and k at (n,) values of the control signal."""

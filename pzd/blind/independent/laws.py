@@ -28,6 +28,8 @@ class Scale:
 
     force: float
     """Of the baseline damper [N]."""
+    friction: float
+    """Largest T0 over the range of the control signal [N]."""
     speed: float
     """Of the piston [m/s]."""
     stroke: float
@@ -289,7 +291,9 @@ def relief_flow(excess: float, C_r: float) -> float:
 
 
 def _draw_relief_valve(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
-    return {"F_r": float(rng.uniform(0.5, 0.9)) * scale.force, "C_r": scale.damping / (1.0 + 10.0 * strength)}
+    # Below the friction it would be open always, and C_r another C.
+    opens = scale.friction + float(rng.uniform(0.2, 0.8)) * max(scale.force - scale.friction, 0.0)
+    return {"F_r": opens, "C_r": scale.damping / (1.0 + 10.0 * strength)}
 
 
 RELIEF_VALVE = Law("relief_valve", _draw_relief_valve)

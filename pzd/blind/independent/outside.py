@@ -188,11 +188,12 @@ def blow_off_flow(
 
 
 def _draw_two_stage_blow_off(rng: Generator, scale: Scale, strength: float) -> dict[str, float]:
-    first = float(rng.uniform(0.4, 0.7)) * scale.force
+    above = max(scale.force - scale.friction, 0.0)
+    first = scale.friction + float(rng.uniform(0.2, 0.6)) * above
     return {
         "first_force": first,
         "first_slope": scale.damping / (1.0 + 20.0 * strength),
-        "second_force": first + float(rng.uniform(0.1, 0.2)) * scale.force,
+        "second_force": first + float(rng.uniform(0.1, 0.2)) * above,
         "second_slope": float(rng.uniform(1.5, 3.0)) * scale.damping,
     }
 

@@ -20,6 +20,8 @@ from pzd.record import Array, Rows
 
 MotionKind = Literal["sine", "two_tone", "triangle", "sweep", "random"]
 SignalKind = Literal["constant", "steps", "ramp"]
+LONGEST_STEP = 1.25e-4
+"""Of the integration [s]: it costs less than 1e-5 of the force, see tests/blind/test_independent_laws.py."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class LaboratoryCampaign:
     """Of the control signal at which parameters are given [V]; one where the damper has none."""
     rate: float
     """Sampling rate [Hz]."""
+    step: float = LONGEST_STEP
+    """Longest step of the integration [s]: a stiff oil spring asks for shorter ones."""
 
     @property
     def one_frequency(self) -> bool:
@@ -162,8 +166,6 @@ def campaign(name: str, rng: Generator) -> LaboratoryCampaign:
 # --- The motion of a test, and the heat of all of them ---
 
 
-LONGEST_STEP = 1.25e-4
-"""Of the integration [s]: it costs less than 1e-5 of the force, see tests/blind/test_independent_laws.py."""
 REST = 0.3
 """Rest of the actuator before it starts [s]."""
 COOLING = 120.0
@@ -242,7 +244,7 @@ def driven(
     coarse : steps four times as long, for a first look
     """
     step = 1.0 / campaign.rate
-    per_sample = int(np.ceil(step / (LONGEST_STEP * (4.0 if coarse else 1.0))))
+    per_sample = int(np.ceil(step / (campaign.step * (4.0 if coarse else 1.0))))
     half = 0.5 * step / per_sample
     before = round((REST + _run_in(test)) / step) * per_sample * 2
     after = round(test.seconds / step) * per_sample * 2

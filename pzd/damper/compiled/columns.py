@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pzd.damper.confounders import known
-from pzd.damper.effect import NODE_VOLTAGES, Effect, Place
+from pzd.damper.confounders import known, module_of
+from pzd.damper.effect import NODE_VOLTAGES, Effect, Place, functions
 from pzd.damper.model import Damper
 from pzd.record import Array
 
@@ -25,12 +25,20 @@ def _columns(*places: Place) -> tuple[Column, ...]:
     return tuple((e.name, p.name) for place in places for e in acting(place) for p in e.parameters)
 
 
+def _columns_with(law: str, place: Place) -> tuple[Column, ...]:
+    """Return the columns of the effects of a place that hold a law."""
+    holding = (e for e in acting(place) if law in functions(e, module_of(e)))
+    return tuple((e.name, p.name) for e in holding for p in e.parameters)
+
+
 DRIVE = _columns("drive")
 """Columns of a row of the drive."""
 STROKE_AND_FLOW = _columns("stroke", "flow")
 """Columns of a row of the element, after T0, C and k."""
-PARALLEL = _columns("parallel", "branch")
-"""Columns of a row of the forces parallel to the element, those without memory first."""
+BESIDE = _columns("parallel", "branch")
+"""Columns of the forces parallel to the element, those without memory first."""
+PARALLEL = (*BESIDE, *_columns_with("direction_factor", "flow"))
+"""Columns of a row of these forces: at its end what scales a branch by the direction, as it does T0 and C."""
 NEUTRAL = {(e.name, p.name): p.neutral for e in known().values() for p in e.parameters}
 """Value of every column where a damper lacks the effect."""
 

@@ -47,6 +47,11 @@ def _call(effect: Effect, name: str, **quantities: str) -> str:
     return f"_{effect.name}_{name}({', '.join(given[argument] for argument in _takes(effect, name))})"
 
 
+def _beside(effect: Effect) -> dict[str, str]:
+    """Return the parameters of a flow effect as a row of the parallel forces holds them."""
+    return {p.name: f"p[{PARALLEL.index((effect.name, p.name))}]" for p in effect.parameters}
+
+
 def _takes(effect: Effect, name: str) -> tuple[str, ...]:
     """Return the arguments of a law."""
     return arguments(functions(effect, module_of(effect))[name])
@@ -206,17 +211,25 @@ def _parallel() -> Iterator[str]:
 
 
 def _branch() -> Iterator[str]:
-    """Yield the branches: each has its own elastic deflection, `state[i]`; all follow the rod, and their forces add."""
+    """Yield the branches: each has its own elastic deflection, `state[i]`; all follow the rod, and their forces add.
+
+    What scales T0 and C by the direction scales the force of a branch by its own.
+    """
     follow, stored, steady = [], [], []
     force: list[str] = []
+    turned = [
+        f"f *= {_call(e, 'direction_factor', side='math.copysign(1.0, f)', **_beside(e))}"
+        for e in _has(acting("flow"), "direction_factor")
+    ]
     for i, effect in enumerate(acting("branch")):
-        own, law = f"state[{i}]", _call(effect, "law", deflection="e")
+        own, law = f"state[{i}]", [f"f = {_call(effect, 'law', deflection='e')}", *turned]
         after = f"e = {_call(effect, 'advance', deflection=own, travel='travel')}"
         follow += _guarded(effect, after, f"{own} = e")
-        force += _guarded(effect, after, f"force += {law}")
-        stored += _guarded(effect, after, f"force += {law} * {_call(effect, 'rate', deflection='e', side='side')}")
+        force += _guarded(effect, after, *law, "force += f")
+        rate = _call(effect, "rate", deflection="e", side="side")
+        stored += _guarded(effect, after, *law, f"force += f * {rate}")
         slipping = _call(effect, "advance", deflection="0.0", travel="side * inf")
-        steady += _guarded(effect, f"e = {slipping}", f"force += {law}")
+        steady += _guarded(effect, f"e = {slipping}", *law, "force += f")
     yield from _function("branches_follow(travel, state, p)", *follow, "return")
     yield from _function("branch_force(travel, state, p)", "force = 0.0", *force, "return force")
     yield from _function("branch_stored(travel, side, state, p)", "force = 0.0", *stored, "return force")

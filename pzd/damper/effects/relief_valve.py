@@ -16,7 +16,9 @@ from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     beyond = float(draw.uniform(0.2, 0.6)) * scales.damping
-    return lambda s: {"F_r": scales.force * (1.0 - 0.95 * s), "C_r": beyond}
+    # Below the yield of every condition it would be open always, which is another C.
+    friction = max((T0 for T0, _ in scales.flow), default=0.0)
+    return lambda s: {"F_r": scales.force - 0.95 * s * max(scales.force - friction, 0.0), "C_r": beyond}
 
 
 def _flatter(values: Mapping[str, float], damping: float) -> bool:

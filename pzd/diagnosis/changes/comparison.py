@@ -11,7 +11,7 @@ import numpy as np
 from pzd.artefacts import NextTest, Rig
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.parameter_rows import rows_per_voltage
+from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
     ELEMENT_COLUMNS,
     Candidate,
@@ -86,6 +86,10 @@ BEYOND_TESTED = 2.0
 """Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
 
 Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
+GONE = 1e-3
+"""Share of an interval by which a value may differ from that of an effect that is off, and be it."""
+ONE_CONDITION = 2.0
+"""Times what is visible that has to be left at one condition alone: its few tests differ by more than all together."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
 ZERO_SHARE = 0.01
@@ -399,7 +403,8 @@ class Findings:
         if rivals:
             verdict = "ambiguous"
         told = list(dict.fromkeys(name for names in others.values() for name in names))
-        if self._left_share(difference) > self.diagnose.unexplained_share and not self.search.leaves_nothing(best):
+        much = self._left_share(difference) > self.diagnose.unexplained_share
+        if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
             doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
             told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
@@ -417,8 +422,12 @@ class Findings:
             reason.append(
                 f"{', '.join(unreached)} acts where no test of {self.before.name} came, and may have been there before"
             )
+        unchanged = tuple(each for each in self._unchanged(best) if each.name not in told)
         if verdict == "unchanged" and (beside := self._left_out_differs() or self._beyond_the_model(best)):
             verdict, reason = "unexplained", [*reason, beside]
+        elif verdict == "unchanged" and (beside := self._at_one_condition(best)):
+            verdict, reason = "unexplained", [*reason, beside]
+            unchanged = tuple(each for each in unchanged if each.name not in ELEMENT_COLUMNS)
         return Changes(
             verdict=verdict,
             from_=self.before.name,
@@ -426,7 +435,7 @@ class Findings:
             compared=compared,
             difference=difference,
             changes=tuple(listed),
-            unchanged=self._unchanged(best),
+            unchanged=unchanged,
             rivals=tuple(told),
             reason="; ".join(reason),
             next_test=self._next_test(best, rivals),
@@ -508,14 +517,11 @@ class Findings:
         """
         if all(c.before is None for c in self.comparisons):
             return None
-        likelihood = self.search.regression.likelihood
-        own = likelihood.own_of_tests(best.residuals, best.scatter)
-        beyond = {}
-        for i, (r, o, c) in enumerate(zip(best.residuals, own, self.comparisons, strict=True)):
-            left = float((r - o) @ (r - o) - np.sum(c.variance))
-            missed = LEVEL**2 * float(np.sum(likelihood.missed_by_model(i)))
-            if c.before is None and left > missed + (self.diagnose.visible * c.peak) ** 2:
-                beyond[c.after] = left**0.5 / c.peak
+        beyond = {
+            c.after: left**0.5 / c.peak
+            for c, left, missed in self._left_of_tests(best)
+            if c.before is None and left > missed + (self.diagnose.visible * c.peak) ** 2
+        }
         if not beyond:
             return None
         test = max(beyond, key=lambda name: beyond[name])
@@ -524,6 +530,48 @@ class Findings:
             f"{100.0 * beyond[test]:.2g} % of its peak, more than that damper misses in its own tests: what shows "
             "there alone has no name"
         )
+
+    def _at_one_condition(self, best: Fitted) -> str | None:
+        """Say at which condition the force changed that is the same at all others; None where it did at none.
+
+        T0, C and k change at a control signal or at all, and over all tests what changed at one temperature alone is
+        too little to be seen.
+        """
+        where, left = self._most_left(best)
+        if left <= ONE_CONDITION * max(self.diagnose.visible, self.search.hidden(best)):
+            return None
+        return f"but {where} {100.0 * left:.2g} % of peak is left: what changed there alone has no name"
+
+    def _most_left(self, best: Fitted) -> tuple[str, float]:
+        """Return the condition at which most is left, and how much (r.m.s., share of peak).
+
+        Beyond noise, what the model may miss, and each test's own offset, gain and delay; nothing where there is one
+        condition alone.
+        """
+        rows, squares = self.first.damper.base, dict[int, list[float]]()
+        for c, left, missed in self._left_of_tests(best):
+            row = nearest_condition(rows, c.voltage, c.temperature)
+            squares.setdefault(row, []).append((left - missed) / c.peak**2)
+        if len(squares) < 2:
+            return "", 0.0
+        means = {row: float(np.mean(each)) for row, each in squares.items()}
+        most = max(means, key=lambda row: means[row])
+        told = [
+            f"{rows[most].voltage_V:.4g} {self.control.unit}" if len(rows_per_voltage(rows)) > 1 else "",
+            f"{rows[most].temperature_degC:.3g} degC" if len({row.temperature_degC for row in rows}) > 1 else "",
+        ]
+        return f"at {' and '.join(filter(None, told))}", max(means[most], 0.0) ** 0.5
+
+    def _left_of_tests(self, best: Fitted) -> Iterator[tuple[Comparison, float, float]]:
+        """Yield every comparison with what is left of it beyond noise and its own offset, gain and delay [N^2].
+
+        And with what the first damper may miss of it, as far as an interval goes [N^2].
+        """
+        likelihood = self.search.regression.likelihood
+        own = likelihood.own_of_tests(best.residuals, best.scatter)
+        for i, (r, o, c) in enumerate(zip(best.residuals, own, self.comparisons, strict=True)):
+            left = float((r - o) @ (r - o) - np.sum(c.variance))
+            yield c, left, LEVEL**2 * float(np.sum(likelihood.missed_by_model(i)))
 
     def _not_reached_before(self, best: Fitted) -> list[str]:
         """Return the effects newly there that would not have shown in any test of the first state, had they been."""
@@ -695,6 +743,8 @@ class Findings:
         neutral = known_parameter(c.name, c.parameter).neutral
         start_value = own if own is not None else (neutral if np.isfinite(neutral) else None)
         low, to, high = sorted(parameter_value(c, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0))
+        if abs(to - neutral) < GONE * (high - low):
+            to = neutral  # a fit ends a hair inside its limits
         return None, start_value, to, low, high
 
     def _element_values(
@@ -789,7 +839,7 @@ class Findings:
         of_damper = list(dict.fromkeys(c.name for c in listed if c.of == "damper"))
         of_stand = list(dict.fromkeys(c.name for c in listed if c.of == "stand"))
         size = f"the force differs by {_digits(difference.rms_N)} N r.m.s."
-        peak = f"{100.0 * difference.share_of_peak:.2g} % of peak"
+        peak = f"{_digits(100.0 * difference.share_of_peak, 2)} % of peak"
         left, noise = _digits(difference.left_N), _digits(difference.noise_N)
         told = [f"{size}, {peak}, of which {left} N are left, {noise} N of them noise"]
         if of_damper:
@@ -802,27 +852,45 @@ class Findings:
                     f"less than {100.0 * hidden:.2g} % of peak would not be seen, since the damper of "
                     f"{self.before.name} misses as much"
                 )
+            if (noise_share := difference.noise_N / self.first.force) > self.diagnose.visible:
+                told.append(f"less than {100.0 * noise_share:.2g} % of peak would not be seen beneath the noise")
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
         told += self._rivals_told(rivals, named=verdict != "unexplained")
         told += self._left_told(verdict, listed, difference)
         temperatures = self._temperatures()
         if None not in temperatures and abs(temperatures[1] - temperatures[0]) > 0.5:  # type: ignore[operator]  # not None
-            told.append(f"the damper was at {temperatures[1]:.3g} degC instead of {temperatures[0]:.3g}")
+            warm = f"the damper was at {temperatures[1]:.3g} degC instead of {temperatures[0]:.3g}"
+            told.append(warm + self._by_temperature(temperatures[1] - temperatures[0]))  # type: ignore[operator]  # not None
+        if len({row.temperature_degC for row in self.first.damper.base}) > 1 and temperatures[0] is not None:
+            told.append(f"T0, C and k are those at {temperatures[0]:.3g} degC, the mean of the tests")
         return [*told, *self._tests_told()]
+
+    def _by_temperature(self, warmer: float) -> str:
+        """Say by how much T0 and C follow the temperature, where that is among the changes."""
+        fall = {
+            c.parameter.removeprefix("beta_"): float(x)
+            for c, x in zip(self.best.coordinates, self.best.values, strict=True)
+            if c.name == "temperature" and c.parameter.startswith("beta_")
+        }
+        words = [f"{name} changes by {100.0 * np.expm1(-beta * warmer):+.2g} %" for name, beta in fall.items()]
+        return f", by which {' and '.join(words)}" if words else ""
 
     def _rivals_told(self, rivals: dict[str, list[str]], *, named: bool) -> Iterator[str]:
         """Say what cannot be told apart; where not all is `named`, that something is left is said apart."""
         for name, others in rivals.items():
             if name == NOTHING:
-                yield f"{' or '.join(others)} may have changed too{', or what is left has no name' * named}"
+                too = " too" if self.best.candidates else ""
+                yield f"{' or '.join(others)} may have changed{too}{', or what is left has no name' * named}"
             else:
                 yield f"{name} cannot be told from {' or '.join(others)} by these tests"
 
     def _left_told(self, verdict: Verdict, listed: Sequence[Change], difference: Difference) -> Iterator[str]:
         """Say what of the difference has no name, and what the damper of the first state misses of its own tests."""
         if verdict == "unexplained":
-            yield "what is left has no name"
+            where, left = self._most_left(self.best)
+            most = f", most of it {where}, {100.0 * left:.2g} % of peak" if left > self.diagnose.visible else ""
+            yield f"what is left has no name{most}"
         elif verdict == "changed" and not self.search.leaves_nothing(self.best):
             yield f"{self._left_share(difference):.0%} of the difference (r.m.s. beyond noise) has no name"
         missed = _missed_share(self.first.damper, self.before.prepared) or 0.0
@@ -884,9 +952,9 @@ class Findings:
         return tuple(found)
 
 
-def _digits(value: float) -> str:
-    """Return a number to three digits, without a power of ten."""
-    return f"{float(f'{value:.3g}'):g}"
+def _digits(value: float, count: int = 3) -> str:
+    """Return a number to so many digits, without a power of ten."""
+    return f"{float(f'{value:.{count}g}'):g}"
 
 
 def _added(fitted: Fitted, best: Fitted) -> list[str]:

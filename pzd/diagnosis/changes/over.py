@@ -9,9 +9,10 @@ import numpy as np
 
 from pzd.artefacts import Rig
 from pzd.artefacts.changes import Course, CourseRow, Numbers
-from pzd.diagnosis.changes.candidates import Candidate
+from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate
 from pzd.diagnosis.changes.comparison import Findings, Verdict, findings_between
 from pzd.diagnosis.changes.pairs import averaged
+from pzd.diagnosis.changes.selection import GAIN
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
 from pzd.fit.intervals import LEVEL
@@ -116,9 +117,12 @@ def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], contro
 def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candidate]:
     """Return the candidates of a pair of states that are fitted together: its own, and the others that are followed.
 
-    T0 is always followed, C where it changed in any state or these two would have shown it.
+    T0 is always followed, C where it changed in any state or these two would have shown it. A gain that cannot be told
+    from T0, C and k of one level is theirs in every state, where they changed in one.
     """
-    chosen = list(found.best.candidates)
+    changed = any(name in ELEMENT_COLUMNS for name, _ in adopted)
+    theirs = changed and not any(c.per_voltage for c in found.search.candidates)
+    chosen = [c for c in found.best.candidates if not (theirs and c.name == GAIN)]
     followed = adopted | {("T0", "T0")} | {(u.name, u.parameter) for u in found.changes().unchanged if u.name == "C"}
     for candidate in found.search.candidates:
         have = {key for c in chosen for key in c.key}

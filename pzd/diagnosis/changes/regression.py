@@ -35,6 +35,8 @@ DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
 """Shares of the difference without a name that are tried, from nothing to all of it."""
 LEAST_VARIANCE = 1e-10
 """Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
+MUCH_OF_TESTS = 0.5
+"""Share of the prior that the tests have each of their own from which a fit is begun with little of it too."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
@@ -240,6 +242,15 @@ class Regression:
         scatter : with which the fit begins
         """
         candidates = tuple(candidates)
+        found = self._fitted(candidates, start, scatter)
+        if not candidates or found.scatter.tests < MUCH_OF_TESTS:
+            return found
+        # What the tests are taken to have each of their own may be the change, which then has nothing to explain.
+        other = self._fitted(candidates, start, replace(scatter, tests=SHARES[0]))
+        return min(found, other, key=lambda each: each.bic)
+
+    def _fitted(self, candidates: tuple[Candidate, ...], start: Array, scatter: Scatter) -> Fitted:
+        """Fit by least squares and estimate the scatter in turn: the optimum is that near the scatter begun with."""
         coordinates = coordinates_of(candidates)
         x = start
         if coordinates:

@@ -33,6 +33,8 @@ EXCHANGES = 6
 """Rounds of the exchange at most; each lowers the criterion."""
 BETTER = 1e-3
 """Least improvement of the criterion: of two candidates that do the same the first in the list stays."""
+AT_MOST = 0.999
+"""Share of the most that a stand does from which a fit has ended there: it comes near a limit, and not to it."""
 AS_GOOD = 2.0
 """Multiple of what the best fit leaves up to which another one is as good: by the triangle inequality, what has no name
 may make either leave so much."""
@@ -282,11 +284,11 @@ class Search:
         """Adopt changes one by one from each of the best beginnings, with exchange, and return the best end.
 
         Of ends that leave nothing visible that with the fewest changes is the best: more of them may stand in for one.
-        Where none does, two changes that oppose each other may.
+        Where none does, two changes that oppose each other may, or T0, C and k that changed together.
         """
         nothing = self.nothing()
         ends, enough = list[Fitted](), list[Fitted]()
-        for beginnings in (self._beginnings, self._opposed):
+        for beginnings in (self._beginnings, self._opposed, self._together):
             ends += [self._without_superfluous(self._continued(self._exchanged(f))) for f in beginnings(nothing)]
             enough = [f for f in ends if f.candidates and self.leaves_nothing(f)]
             if enough or self.leaves_nothing(nothing):
@@ -308,6 +310,11 @@ class Search:
         alone = [f for f in self._additions(nothing, opposed=True) if f.bic - nothing.bic <= self.adopt_bic]
         both = [f for one in alone[:BEAM] for f in self._additions(one) if self.leaves_nothing(f)]
         return sorted((f for f in both if f.bic - nothing.bic <= self.adopt_bic), key=lambda f: f.bic)[:BEAM]
+
+    def _together(self, nothing: Fitted) -> list[Fitted]:
+        """Return the fits of T0, C and k together that leave nothing visible: by more than a gain may be."""
+        fits = [self._fit(group, np.zeros(len(group)), nothing.scatter) for group in self._groups()]
+        return [f for f in fits if f.bic - nothing.bic <= self.adopt_bic and self.leaves_nothing(f)][:BEAM]
 
     def leaves_nothing(self, fitted: Fitted) -> bool:
         """Whether a fit leaves nothing visible beyond noise and what tests differ by themselves."""
@@ -398,9 +405,14 @@ class Search:
         """Whether the last change of a fit is physical, makes at least so much force, and each number of it shows.
 
         A law of which a number does nothing is another law: a valve that is open from the yield on is a smaller C.
-        `at_limit` allows it.
+        `at_limit` allows it. A gain or a delay that ends at the most a stand does would be more, and is the damper's.
         """
         first, new = self.regression.response.first, fitted.candidates[-1]
+        if any(
+            c.of == "stand" and abs(x) > AT_MOST * c.high
+            for c, x in zip(fitted.coordinates, fitted.values, strict=True)
+        ):
+            return False
         if not first.is_natural(fitted.coordinates, fitted.values.tolist()) or self.size_of(fitted, new) < least:
             return False
         return at_limit or self._each_number_shows(fitted)
@@ -505,7 +517,8 @@ class Search:
         near = [f for f in fits if self._is_rival(f, best, less) and self._leaves_less(f, less)]
         # A C that is smaller at one value of the control signal alone may be a valve that opens just above the yield.
         limit = candidate.per_voltage
-        return [fitted for fitted in near if self._admissible(fitted, self._possible(fitted), at_limit=limit)]
+        found = [fitted for fitted in near if self._admissible(fitted, self._possible(fitted), at_limit=limit)]
+        return found or [f for f in fits if self._is_gain(f, best, candidate)]
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or it leaves no more than the model misses.
@@ -525,26 +538,42 @@ class Search:
             return False
         return self._as_good(fitted, best) and AS_GOOD * self.left(fitted) <= self.left(less)
 
+    def _is_gain(self, fitted: Fitted, best: Fitted, candidate: Candidate) -> bool:
+        """Whether T0, C and k changed as a gain of the load cell changes them, which is one number however many do.
+
+        At one control signal alone: what makes all three larger by a share makes them so hardly at every one.
+        """
+        added = [c for c in fitted.candidates if c.name in ELEMENT_COLUMNS and c not in best.candidates]
+        if candidate.name != GAIN or not added or any(c.per_voltage for c in self.candidates):
+            return False
+        more = (fitted.values.size - best.values.size) * float(np.log(self.regression.likelihood.size))
+        return fitted.bic - more <= best.bic + self.rival_bic
+
     def perhaps(self, best: Fitted) -> list[Fitted]:
-        """Return the fits with one change more that is nearly adopted, or a rival of such a one."""
+        """Return the fits with one change more that is nearly adopted, or a rival of such a one.
+
+        Where the best one leaves something also those that leave nothing, T0, C and k together among them: too few
+        tests make them sure, and what they explain is not without a name.
+        """
         if len(best.candidates) >= MOST_CHANGES:
             return []
         added = self._additions(best, possible=True)
         more = [f for f in added if f.bic < best.bic and self._predicts(f, f.candidates[-1])]
         enough = best.bic + self.adopt_bic + self.rival_bic
-        if not more or more[0].bic > enough:
+        if more and more[0].bic <= enough:
+            return [f for f in more if f.bic <= max(enough, more[0].bic + self.rival_bic)]
+        if self.leaves_nothing(best):
             return []
-        return [f for f in more if f.bic <= max(enough, more[0].bic + self.rival_bic)]
+        if not best.candidates:
+            more += [self._fit(group, np.zeros(len(group)), best.scatter) for group in self._groups()]
+        return sorted((f for f in more if f.bic < best.bic and self.leaves_nothing(f)), key=lambda f: f.bic)
 
     def _grouped(self, best: Fitted, candidate: Candidate) -> list[Fitted]:
         """Return the fits with several of T0, C and k in the place of a gain, and a gain in the place of several."""
-        single = {
-            c.name: c for c in reversed(self.candidates) if not c.per_voltage and c.name in (*ELEMENT_COLUMNS, GAIN)
-        }
+        single = self._single()
         others = tuple(c for c in best.candidates if c.name not in single)
         if candidate.name == GAIN:
-            names = [n for n in ELEMENT_COLUMNS if n in single]
-            groups = [tuple(single[n] for n in group) for size in (2, 3) for group in combinations(names, size)]
+            groups = self._groups()
         elif candidate.name in ELEMENT_COLUMNS and sum(c.name in ELEMENT_COLUMNS for c in best.candidates) > 1:
             groups = [(single[GAIN],), *((single[GAIN], single[n]) for n in ELEMENT_COLUMNS if n in single)]
         else:
@@ -557,3 +586,15 @@ class Search:
             start = [best.values_of(c) for c in others] + [np.zeros(len(c.coordinates)) for c in group]
             found.append(self._fit(together, np.concatenate(start), best.scatter))
         return found
+
+    def _single(self) -> dict[str, Candidate]:
+        """Return the candidates of T0, C, k and the gain that are the same at every control signal, by name."""
+        return {
+            c.name: c for c in reversed(self.candidates) if not c.per_voltage and c.name in (*ELEMENT_COLUMNS, GAIN)
+        }
+
+    def _groups(self) -> list[tuple[Candidate, ...]]:
+        """Return two or all of T0, C and k."""
+        single = self._single()
+        names = [name for name in ELEMENT_COLUMNS if name in single]
+        return [tuple(single[n] for n in group) for size in (2, 3) for group in combinations(names, size)]

@@ -81,8 +81,8 @@ def _row(found: PredictingShapes, place: int, residuals: Residuals, control: Con
         standard_errors=min(found.standard_errors, 1e6),
         W_s_before=before or 0.0,
         W_s_after=found.error.criterion or 0.0,
-        physics=shape.physics,
-        library=" or ".join(shape.library) or None,
+        physics=shape.physics_of(float(values[0])),
+        library=" or ".join(shape.library_of(float(values[0]))) or None,
         source=shape.source,
     )
 

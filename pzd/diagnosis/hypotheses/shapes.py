@@ -182,6 +182,16 @@ class Shape:
     """Half width of its position [half strokes]."""
     library: tuple[str, ...] = ()
     """Effects of the library that have this shape."""
+    below_zero: str = ""
+    """Physics of a negative coefficient, where what has the shape knows none; no effect of the library has that."""
+
+    def physics_of(self, coefficient: float) -> str:
+        """Return what has the shape with a coefficient of this sign."""
+        return self.below_zero if self.below_zero and coefficient < 0.0 else self.physics
+
+    def library_of(self, coefficient: float) -> tuple[str, ...]:
+        """Return the effects of the library that have the shape with a coefficient of this sign."""
+        return () if self.below_zero and coefficient < 0.0 else self.library
 
 
 def _shape(
@@ -193,13 +203,14 @@ def _shape(
     law: str | None = None,
     needs: Needs | None = None,
     library: tuple[str, ...] = (),
+    below_zero: str = "",
 ) -> Shape:
     """Return a shape of one column, without a searched parameter."""
 
     def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
         yield None, np.asarray(function(s))[:, None]
 
-    return Shape(name, unit, physics, source, columns, law=law, needs=needs, library=library)
+    return Shape(name, unit, physics, source, columns, law=law, needs=needs, library=library, below_zero=below_zero)
 
 
 _DIXON = "Dixon 2007, The Shock Absorber Handbook"
@@ -238,7 +249,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("|x|", "N/m", "a spring that pushes the same way on both sides, bent at the middle", _DIXON,
            lambda s: np.abs(s.x), "abs(x)"),
     _shape("x^3", "N/m3", "a spring that hardens to both ends, as rubber stops or mounts give", _DIXON,
-           lambda s: s.x**3, "x * x * x", library=("end_stop",)),
+           lambda s: s.x**3, "x * x * x", library=("end_stop",), below_zero="a spring that softens to both ends"),
     Shape("sin 2 pi x/lambda", "N", "a force that waves over the position: cogging of magnets, a thread, a wavy guide",
           "Hendershot and Miller 1994, Design of Brushless Permanent-Magnet Motors: cogging", waves, "lambda", "m",
           law="math.sin(2.0 * math.pi * x / {parameter});math.cos(2.0 * math.pi * x / {parameter})"),
@@ -250,11 +261,13 @@ SHAPES: tuple[Shape, ...] = (
     _shape("v^2", "N s2/m2", "an orifice that differs between rebound and compression", _DIXON,
            lambda s: s.v**2, "v * v", library=("asymmetry",)),
     _shape("|v| v", "N s2/m2", "an orifice", "Merritt 1967, Hydraulic Control Systems", lambda s: np.abs(s.v) * s.v,
-           "abs(v) * v", library=("orifice_quadratic",)),
+           "abs(v) * v", library=("orifice_quadratic",),
+           below_zero="damping that rises less than the speed does, as a valve gives that opens"),
     _shape("sign v", "N", "dry friction of seal or guide, behind no spring", _FRICTION,
            lambda s: np.sign(s.v), _SIGN, library=("stribeck_friction",)),
     _shape("a", "kg", "a mass: the oil column, or the stand's own", _DIXON, lambda s: s.a, "a",
-           library=("fluid_inertia",)),
+           library=("fluid_inertia",),
+           below_zero="a spring that stiffens with the frequency, as rubber does, or a force that comes late"),
     _shape("a |v|", "kg s/m", "a force that differs between speeding up and slowing down", _DUYM,
            lambda s: s.a * np.abs(s.v), "a * abs(v)"),
     _shape("|a| v", "N s3/m2", "damping that rises with the acceleration", _DUYM,
@@ -322,6 +335,7 @@ def _by_control(shape: Shape) -> Shape:
         name=f"U {shape.name}",
         unit=f"{shape.unit}/V",
         physics=f"{shape.physics}, in proportion to the control signal",
+        below_zero=shape.below_zero and f"{shape.below_zero}, in proportion to the control signal",
         columns=columns,
         per_control=True,
     )

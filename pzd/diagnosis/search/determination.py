@@ -1,4 +1,4 @@
-"""Which effects of a fit are none: off as well, at a limit, cancelled by another, or another form of T0 and C.
+"""Which effects of a fit are none: off as well, at a limit, cancelled by another, no constant, or T0 and C anew.
 
 Such an effect may lower the misfit all the same. Outside the tests it does anything: a stop that begins just beyond the
 stroke, two forces of kilonewtons that cancel within it. So it is neither adopted nor handed on, and the rest is fitted
@@ -8,6 +8,7 @@ again.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -19,7 +20,7 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.fit.least_squares import FitResult, search_errors, standard_errors
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import ZERO, Problem
-from pzd.fit.intervals import LEVEL
+from pzd.fit.intervals import LEVEL, between_tests
 from pzd.record import Array
 from pzd.signals.measures import rms
 
@@ -73,6 +74,48 @@ def at_limits(fitted: FitResult) -> Iterator[str]:
             beside = min(float(x) - u.bounds[0], u.bounds[1] - float(x)) <= near
             ends.setdefault((u.effect, u.parameter.name), []).append(beside)
     yield from dict.fromkeys(effect for (effect, _), each in ends.items() if all(each))
+
+
+@dataclass(frozen=True)
+class Varying:
+    """Strength of an effect that is no constant."""
+
+    parameter: str
+    share: float
+    """Standard deviation from test to test, as a share of the strength."""
+    probability: float
+    """Of as much by noise alone."""
+
+
+def varying_strengths(problem: Problem, fitted: FitResult, significance: float) -> dict[str, Varying]:
+    """Return the effects of a fit whose strength, the first parameter, differs from test to test: it is no constant.
+
+    A force that follows another law takes the place of one that it resembles in each test by itself, as rubber does
+    that of a spring: at another frequency or amplitude the likeness has another size. Of an offset or a delay each
+    test has its own.
+
+    Parameters
+    ----------
+    problem : observations of the fit
+    fitted : its optimum
+    significance : probability by noise alone below which the strengths differ
+    """
+    names = [o.name for o in problem.observations]
+    places = {name: [i for i, each in enumerate(names) if each == name] for name in dict.fromkeys(names)}
+    each = np.split(fitted.jacobian.dense(), np.cumsum([r.size for r in fitted.residuals])[:-1])
+    slopes = [np.concatenate([each[i] for i in own]) for own in places.values()]
+    residuals = [np.concatenate([fitted.residuals[i] for i in own]) for own in places.values()]
+    first, found = fitted.optimum.size - len(fitted.unknowns), dict[str, Varying]()
+    for column, u in enumerate(fitted.unknowns, start=first):
+        effect = library().get(u.effect)
+        if effect is None or u.effect in thresholds.NUISANCE_EFFECTS or u.parameter != effect.parameters[0]:
+            continue
+        spread, probability = between_tests(slopes, residuals, column, fitted.prior)
+        size = abs(u.value_in(fitted.damper) - u.parameter.neutral) if np.isfinite(u.parameter.neutral) else np.inf
+        share = spread if u.parameter.search.logarithmic else spread * abs(u.derivative(0.0)) / size
+        if probability < significance and share > thresholds.CONSTANT_WITHIN:
+            found[u.effect] = Varying(u.parameter.name, share, probability)
+    return found
 
 
 def opens_below_friction(damper: Damper) -> bool:

@@ -116,7 +116,9 @@ def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
 log = logging.getLogger(__name__)
 
 
-def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
+def select_effects(
+    campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1, *, rows_by_temperature: bool = False
+) -> Selection:
     """Adopt effects one after another while the next improves the fit, is supported by itself, and a gap is left.
 
     Parameters
@@ -125,13 +127,15 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     damper : baseline, at which the fits start
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
+    rows_by_temperature : whether T0, C and k stay those of each temperature, whatever rows of a voltage would pay
     """
     weigh = partial(evidence_of, campaign)
     evidence = weigh(damper)
     search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
     search.settle_weights()
     search.choose_oil_spring()
-    search.choose_temperature_axis()
+    if not rows_by_temperature:
+        search.choose_temperature_axis()
     initial_evidence, search.baseline = search.evidence, search.current
     search.adopt_forced()
     while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():

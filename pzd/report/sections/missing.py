@@ -103,7 +103,12 @@ def verdict(context: ReportContext) -> str:
     elif context.damper.fitted_law:
         text = "The knee law leaves a gap that repeats, and no effect was looked for beside it"
     else:
-        found = f"; {adopted} is part of it" if adopted else ""
+        for_prediction = {name for name, each in diagnosis.support.items() if each.added}
+        known = [name for name in diagnosis.effects if name not in for_prediction]
+        added = [name for name in diagnosis.effects if name in for_prediction]
+        found = f"; {listed(effects_in_words(known))} is part of it" if known else ""
+        stands = "it stands" if len(added) == 1 else "they stand"
+        found += f"; {listed(effects_in_words(added))} predicts, whatever {stands} for" if added else ""
         text = f"Something is missing that the library of effects does not explain{found}"
     return f"{text}."
 

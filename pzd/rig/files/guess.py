@@ -173,6 +173,7 @@ class SniffedFile:
             d.encoding,
             d.headless or d.apart,
             tuple(kind),
+            None if TIME in dict(self.columns) else _rate(self),
         )
 
 
@@ -259,10 +260,9 @@ def _keys(
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
     missing = [q for q in NEEDED if q not in columns]
-    rates = {_rate(file) for file in files} if TIME in missing else set()
-    if len(rates) == 1 and (rate := rates.pop()):
+    if TIME in missing and (rate := _sampling_rate(files[0], columns)):
         missing.remove(TIME)
-        yield f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
+        yield rate
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
@@ -289,6 +289,25 @@ def _keys(
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
+def _sampling_rate(file: SniffedFile, columns: dict[Quantity, str]) -> str | None:
+    """Write the sampling rate of a file in which no column may hold the time; it is empty where no line tells it."""
+    if rate := _rate(file):
+        return f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
+    if any(not _counts_rows(file, head) for head in _candidates(file, columns, TIME)):
+        return None
+    return "rate_Hz:   # fill in: samples a second, e.g. 1000; no column holds the time"
+
+
+def _counts_rows(file: SniffedFile, head: str) -> bool:
+    """Whether a column numbers the rows."""
+    try:
+        sheet = read_sheet(file.path, _as_sniffed(file), Wanted(numbers=frozenset((head,))), "rig.files")
+    except DataError:
+        return False
+    numbers = sheet.numbers.get(sheet.header.index(head), np.empty(0)) if head in sheet.header else np.empty(0)
+    return numbers.size > 1 and bool(np.all(np.diff(numbers) == 1.0))
+
+
 def _asked_columns(
     file: SniffedFile,
     columns: dict[Quantity, str],
@@ -311,7 +330,11 @@ def _asked_units(file: SniffedFile, columns: dict[Quantity, str], missing: Seque
     """Write the empty places of units of columns that are asked for, where their headers name none."""
     for quantity in missing:
         heads = [(head, file.unit_below(head)) for head in _candidates(file, columns, quantity)]
-        if heads and any(unit_of(head, below, quantity) is None for head, below in heads):
+        first = dict(zip(file.dialect.header, file.dialect.first, strict=False))
+        forms = {_date_format(first.get(head, "")) for head, _ in heads}
+        if quantity is TIME and len(forms) == 1 and None not in forms:
+            yield f"  time: '{forms.pop()}'"
+        elif heads and any(unit_of(head, below, quantity) is None for head, below in heads):
             yield f"  {quantity.name}:   # fill in: the unit of that column, e.g. {_OFTEN[quantity]}"
 
 
@@ -325,7 +348,8 @@ def _candidates(file: SniffedFile, columns: dict[Quantity, str], quantity: Quant
     may = [head for head in filled if _may_hold(head, file.unit_below(head), quantity)]
     free = [head for head in may if head not in columns.values()]
     # Else one of a quantity that a file may go without: a load cell in volts looks like a control signal.
-    return free or [head for head in may if head not in [columns.get(needed) for needed in NEEDED]]
+    motion = (*NEEDED, VELOCITY, ACCELERATION)
+    return free or [head for head in may if head not in [columns.get(each) for each in motion]]
 
 
 def _may_hold(head: str, below: str | None, quantity: Quantity) -> bool:
@@ -619,7 +643,10 @@ def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     if any(not _candidates(file, columns, q) for q in lacking):
         what = f"without {' and '.join(q.name for q in lacking)} no damper: this file has {here}"
         telemetry = TIME in columns and FORCE in lacking and not _candidates(file, columns, FORCE)
-        raise DataError(f"{at(path, line)}: {what}{', as telemetry of a car has' if telemetry else ''}")
+        hint = ", as telemetry of a car has" if telemetry else ""
+        if lacking == [DISPLACEMENT] and VELOCITY in columns:
+            hint = "; write the integral of the velocity beside it, each cycle about its middle, in a column of its own"
+        raise DataError(f"{at(path, line)}: {what}{hint}")
     return file
 
 

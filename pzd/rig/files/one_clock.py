@@ -233,9 +233,14 @@ def _common_rows(path: Path, lead: _Channel, channels: Sequence[_Channel]) -> tu
             paused |= known & _in_gap(channel.time, lead.time)
     known &= ~paused
     if np.count_nonzero(known) < 2:
+        heads = {channel.head for channel in channels}
+        whole = any(heads <= set(channel.table.header) for channel in (late, short))
+        advice = (
+            "are these tests of their own? say table: NAME" if whole else "export both as recorded at the same time"
+        )
         raise DataError(
             f"{table_place(path, late.table.name)}: {late.head!r} begins at {late.time[0]:.6g} s, when {short.head!r} "
-            f"has ended ({short.end:.6g} s): they have no time in common; are these tests of their own? say table: NAME"
+            f"has ended ({short.end:.6g} s): they have no time in common; {advice}"
         )
     cuts = [
         ReadingStep("left out", None, f"{counted(int(np.count_nonzero(rows)), 'row')} of {channel.head!r} {where}", "")

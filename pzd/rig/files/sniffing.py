@@ -231,13 +231,13 @@ _UNITS_IN_NAMES = {
     "voltage": "mV|kV|V|Volts?",
     "current": "mA|A|Amps?",
     "pwm": "%|pct|percent",
-    "temperature": "degC|C",
+    "temperature": "degC|C|degF|(?<=[0-9][0-9])F",  # F2 and 2F are front more often than degrees
 }
 _VALUES = {
     name: re.compile(rf"{_NUMBER}{'' if name == 'temperature' else ' ?'}({units})(?![A-Za-z]| ?=)")
     for name, units in _UNITS_IN_NAMES.items()
 }
-"""150V, 0x5A, 0p5A, 0.5 Amp, 40pct, 22degC."""
+"""150V, 0x5A, 0p5A, 0.5 Amp, 40pct, 22degC, 104F."""
 _WORDS_IN_NAMES = {
     "voltage": "volt(?:age)?|spannung|tension",
     "current": "current|strom|courant|corriente",
@@ -284,7 +284,7 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str | None] | 
 
 def _spelled_unit(unit: str) -> str:
     """Return the unit of a value in a name as pint spells it."""
-    return {"C": "degC"}.get(unit, SPELLINGS.get(unit, unit))
+    return _DEGREES.get(unit, SPELLINGS.get(unit, unit))
 
 
 def _value_behind_word(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
@@ -81,8 +82,10 @@ def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
         return entry
     if np.ptp(offsets) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{OFFSET_MEANS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
-    elif (chance := _in_order_of_speed(entries)) <= BY_CHANCE:
+    elif (chance := _in_order_of(entries, "velocity_rms_m_per_s")) <= BY_CHANCE:
         follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
+    elif _in_order_of(entries, "force_rms_N") <= BY_CHANCE:
+        follows = "it goes with the force of the test, as where rebound is unlike compression; no tare does that"
     elif usual and abs(mine + usual) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
     elif chance <= OF_FEW and abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
@@ -102,14 +105,14 @@ def _offset_of(entry: RecordEntry) -> float:
     return next((finding.size for finding in entry.findings if finding.check == "offset"), 0.0)
 
 
-def _in_order_of_speed(entries: list[RecordEntry]) -> float:
-    """Return the probability that the offsets of records rise, or fall, so orderly with the speed by chance.
+def _in_order_of(entries: list[RecordEntry], size: Literal["velocity_rms_m_per_s", "force_rms_N"]) -> float:
+    """Return the probability that offsets rise, or fall, so orderly with the speed or the force of the test by chance.
 
     Equation: the exact probability of Kendall's tau        Source: Kendall 1938, Biometrika 30
     """
     from scipy.stats import kendalltau
 
-    pairs = [(e.velocity_rms_m_per_s or 0.0, _offset_of(e)) for e in entries if _offset_of(e) != 0.0]
+    pairs = [(getattr(e, size) or 0.0, _offset_of(e)) for e in entries if _offset_of(e) != 0.0]
     return float(kendalltau(*zip(*pairs, strict=True)).pvalue) if len(pairs) >= LEAST_RECORDS else 1.0
 
 
@@ -135,6 +138,10 @@ TRIES = 61
 """Delays that are tried at first, a sixtieth of a cycle from one to the next,"""
 NARROWED = 21
 """and then between the neighbours of the best, so often that they lie closer than half a sample."""
+ASKED_BY = 0.5
+"""Least share of the tests that would show a delay, and ask for it: in fewer it is a law that is missing."""
+ALIKE_WIDTH = 1.5
+"""Ratio up to which two motions are as fast as one another, and of as many frequencies."""
 ALIKE_DELAYS = 0.25
 """Delays further than this share from the usual one are no recorder's: what is fitted to them differs as much."""
 
@@ -189,24 +196,53 @@ def best_delay(test: PreflightRecord) -> tuple[float, float, bool]:
 
 
 def drop_contradicting_delays(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
-    """Drop the delays of a setting whose records ask for different ones.
+    """Drop the delays of a setting whose records ask for different ones, and those that most of their kind do not ask.
 
-    A recorder is late by the same time in all tests, a hysteresis by an angle or a displacement.
+    A recorder is late by the same time in all tests, a hysteresis by an angle or a displacement, and a law that is
+    missing looks like a delay in single tests.
     """
     found: dict[str | None, list[float]] = {}
     for entry in entries:
-        found.setdefault(entry.setting, []).extend(f.size for f in entry.findings if f.check == "delay")
+        found.setdefault(entry.setting, []).extend(_delays(entry))
     different = {
         setting
         for setting, delays in found.items()
         if delays and np.ptp(delays) > 2.0 * max(ALIKE_DELAYS * abs(np.median(delays)), LEAST_DELAY)
     }
+
+    def contradicted(entry: RecordEntry) -> bool:
+        asked = [bool(_delays(other)) for other in entries if _would_show_it(entry, other)]
+        return entry.setting in different or sum(asked) < ASKED_BY * len(asked)
+
     return tuple(
         entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "delay")})
-        if entry.setting in different
+        if _delays(entry) and contradicted(entry)
         else entry
         for entry in entries
     )
+
+
+def _delays(entry: RecordEntry) -> list[float]:
+    return [finding.size for finding in entry.findings if finding.check == "delay"]
+
+
+def _would_show_it(entry: RecordEntry, other: RecordEntry) -> bool:
+    """Whether another test of the same level shows a delay as well as one does: as fast, and of as many frequencies.
+
+    In a sine a delay is nearly a softer spring.
+    """
+    same_level = (
+        entry.voltage_V is None or other.voltage_V is None or np.isclose(entry.voltage_V, other.voltage_V, 0.05)
+    )
+    (speed, width), (its_speed, its_width) = _speed_and_width(entry), _speed_and_width(other)
+    alike = max(width, its_width) <= ALIKE_WIDTH * min(width, its_width)
+    return entry.setting == other.setting and bool(same_level) and alike and ALIKE_WIDTH * its_speed >= speed
+
+
+def _speed_and_width(entry: RecordEntry) -> tuple[float, float]:
+    """Return r.m.s. speed over displacement [1/s], and acceleration over speed as a multiple of it: 1 of a sine."""
+    x, v, a = entry.displacement_rms_m, entry.velocity_rms_m_per_s, entry.acceleration_rms_m_per_s2
+    return (v / x, a * x / v**2) if x and v and a else (0.0, 1.0)
 
 
 def residual_of_rigid_damper(section: Section) -> float:

@@ -169,6 +169,7 @@ rig:
 blind:
   seed: 5
   tuned_on: [1]
+  base_spread: 0.1  # an oil spring that bends shows where the oil gives way
   sizes: [0.1, 0.1]
   force_noise: [0.005]
   noise_rho: [0.5]

@@ -331,3 +331,29 @@ def test_what_has_no_name_leaves_open_what_did_not_change_and_so_does_what_was_t
     loud = Uncertainty(found.search, left).if_changed(damping)
     assert loud.alone * loud.force > 0.9 * 0.01 / LEVEL
     assert loud.alone > quiet.alone
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "share"),
+    [
+        ("gas_spring", "k_g", 0.08),
+        ("fluid_inertia", "m", 0.08),
+        ("lash", "delta", 0.03),
+        ("orifice_quadratic", "q", 0.1),
+    ],
+)
+def test_an_effect_that_is_gone_ends_at_none_whatever_the_noise(
+    effect: str, parameter: str, share: float, rng: np.random.Generator
+) -> None:
+    """A hair below it, where half of all noise puts the fit, nature has no value, and that was no change at all."""
+    scale = {"k_g": FORCE / STROKE, "m": FORCE / 5.0, "delta": STROKE, "q": FORCE / SPEED**2}[parameter]
+    for draw in rng.spawn(6):
+        plain = drawn_damper(draw, voltages=(0.0,))
+        damper = plain.with_effect(effect, {parameter: share * scale})
+        before, after = (state_of(name, campaign(d, draw)) for name, d in (("new", damper), ("aged", plain)))
+        known = replace(before, damper=damper)
+        changes = changes_between(known, after, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+        assert effect in names_told(changes), changes.reason
+        assert changes.verdict in ("changed", "ambiguous"), changes.reason
+        gone = [change for change in changes.changes if change.name == effect]
+        assert all(abs(change.to) <= max(change.high95 - change.to, 1e-9) for change in gone)

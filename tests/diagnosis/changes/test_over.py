@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from states import campaign, drawn_damper, scaled, state_of
+from states import campaign, drawn_damper, scaled, sine, state_of
 
-from pzd.diagnosis.changes.over import followed_over
+from pzd.artefacts import Rig
+from pzd.diagnosis.changes.over import blocks_of_cycles, followed_over
+from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
 from pzd.quantities import Control
 
 
@@ -31,3 +36,21 @@ def test_friction_that_rises_leaves_its_limits_and_what_changed_in_no_state_stay
     assert "gas_spring.k_g changed in no state" in course.reason
     assert followed(T0=(0.0, 2.0 * friction)).pass_ is True
     assert followed(T0=(0.0, 2.0 * friction), gas_spring__k_g=(0.0, 1.0)).pass_ is None
+
+
+def test_the_force_that_fades_in_a_long_test_is_followed_over_its_cycles(rng: np.random.Generator) -> None:
+    damper = drawn_damper(rng, voltages=(0.0,))
+    count, lost = 16, 0.15
+    records = [sine(damper, 0.0, f, 0.02, rng, noise=0.003, scatter=0.0, cycles=count) for f in (1.0, 2.0)]
+    fading = [replace(r, force=r.force * (1.0 - lost * r.time / r.time[-1])) for r in records]
+    blocks = blocks_of_cycles(Rig(tuple(fading), ()), None)
+    states = [State.of(name, rig, identify(IdentifyConfig(), rig, 1), None, Control()) for name, rig in blocks]
+    course = followed_over(states, DiagnoseConfig(), IdentifyConfig(), ChangesConfig(), Control()).course
+    assert (course.states[0], course.states[-1]) == ("cycles 1-2", "cycles 15-16")
+    rows = {row.name: np.array(row.values, dtype=float) for row in course.over}
+    middles = (np.arange(8) + 0.5) / 8
+    for name in ("T0", "C"):
+        followed = rows[name] / rows[name][0]
+        assert followed == pytest.approx((1.0 - lost * middles) / (1.0 - lost * middles[0]), abs=0.02)
+    assert course.verdict != "unchanged"
+    assert "load_cell_gain" in course.rivals  # at one level it cannot be told from all of T0, C and k
