@@ -92,6 +92,14 @@ def test_projecting_out_friction_and_damping_does_not_bias_a_coefficient(rng: np
     assert orifice.coefficient == pytest.approx(1500.0, rel=0.1)
 
 
+def test_a_shape_whose_sign_no_orifice_has_is_not_called_one(rng: np.random.Generator) -> None:
+    found = told(records_with(lambda r: -900.0 * np.abs(r.velocity) * r.velocity, rng))
+    row = next(row for row in found.alone if row.shape == "|v| v")
+    assert row.coefficient < 0.0
+    assert row.library is None
+    assert "as a valve gives that opens" in row.physics
+
+
 def test_gain_offset_and_delay_of_a_test_are_projected_out(rng: np.random.Generator) -> None:
     """By their priors: a gain of 2 % counts as one square of noise, however many samples show it."""
     validation = fitted(records_with(lambda r: np.zeros(r.time.size), rng))

@@ -29,6 +29,7 @@ from pzd.artefacts import (
     Table,
     TableNotes,
 )
+from pzd.artefacts.diagnosis import Support
 from pzd.artefacts.identified import WarmUpRow
 from pzd.damper.model import BaseRow, Damper
 from pzd.identification.characteristics import characteristics
@@ -304,6 +305,16 @@ def test_every_verdict_has_its_words(words_only: None, run: Any, changes: dict[s
     assert read.sections() == ORDER
     if "next_test" in changes:
         assert "None is proposed" in read.text
+
+
+def test_what_came_in_for_its_prediction_is_not_said_to_be_in_the_damper(words_only: None, run: Any) -> None:
+    known = Support(share=0.6, folds_better=4, folds=4, replaced_by=None, confidence=0.99, sure="certain")
+    added = known.model_copy(update={"share": 0.1, "sure": "open", "added": True})
+    effects = ("orifice_quadratic", "bouc_wen")
+    support = dict(zip(effects, (known, added), strict=True))
+    read = Reader(run.with_diagnosis(verdict="unexplained", effects=effects, support=support).told().page)
+    assert "(orifice_quadratic) is part of it;" in read.text
+    assert "(bouc_wen) predicts, whatever it stands for." in read.text
 
 
 def test_a_test_at_a_voltage_between_two_others_is_told_with_what_it_is_for(words_only: None, run: Any) -> None:

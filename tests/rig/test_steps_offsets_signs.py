@@ -83,6 +83,17 @@ def test_offsets_of_few_tests_that_go_with_the_speed_are_not_taken_out_as_a_tare
     assert not any("take it out of these files" in one for one in said)
 
 
+def test_offsets_that_go_with_the_force_are_no_tare(tmp_path: Path) -> None:
+    """Friction that differs between rebound and compression, more of it in each test at about one speed."""
+    for number, friction in enumerate((100.0, 180.0, 260.0, 330.0, 410.0, 480.0, 560.0)):
+        x = sine(0.008, 1.5 + 0.01 * (number * 3 % 7))
+        v = np.gradient(x, TIME)
+        stored(tmp_path, f"{number}", x, friction * (np.tanh(v / 0.005) + 0.2 * np.abs(np.tanh(v / 0.005))))
+    said = [f.follows for entry in run(tmp_path).entries for f in entry.findings if f.check == "offset"]
+    assert len(said) == 7
+    assert all("goes with the force" in one for one in said)
+
+
 def delays(folder: Path) -> list[float]:
     return [f.size for entry in run(folder).entries for f in entry.findings if f.check == "delay"]
 
