@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array
 from pzd.schema.model import Frozen
+from pzd.signals.jumps import jump_timing_error, unresolved_flanks
+from pzd.signals.measures import reversals
 
 
 class Truth(Frozen):
@@ -172,6 +175,21 @@ class NoiseFreeRecord:
     def peak(self) -> float:
         """Largest force [N]."""
         return float(np.max(np.abs(self.force)))
+
+    @cached_property
+    def _turns(self) -> list[int]:
+        return reversals(self.motion.displacement)
+
+    def missed_by(self, simulated: Array) -> Array:
+        """Compute what a simulated force (n,) misses of the force (n,) [N]; of a jump within one sample, not when.
+
+        A friction behind a stiff spring turns within a micrometre: whether a sample at the reversal has the force from
+        before it or from after is chance, and would outweigh all else.
+        """
+        rate = 1.0 / float(np.median(np.diff(self.motion.time)))
+        jumps = unresolved_flanks(self.force, self._turns, rate) | unresolved_flanks(simulated, self._turns, rate)
+        timing = np.where(jumps, jump_timing_error(self.force, simulated), 0.0)
+        return np.asarray(self.force - simulated - timing)
 
 
 def write_noise_free(path: Path, records: Sequence[NoiseFreeRecord]) -> None:

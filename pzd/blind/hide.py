@@ -372,7 +372,8 @@ _EVALUATIONS = 30
 def gap_after_refit(records: Sequence[NoiseFreeRecord], damper: Damper) -> float:
     """Compute the residual of noise-free records after T0, C and k are refitted in every base row.
 
-    Equation: min sqrt(mean ((F - F_sim) / F_peak)^2), F_peak of each record, over all samples of all records
+    Equation: min sqrt(mean ((F - F_sim) / F_peak)^2), F_peak of each record, over all samples of all records; when
+    within a sample a friction turns does not count, see `NoiseFreeRecord.missed_by`
 
     Parameters
     ----------
@@ -424,7 +425,7 @@ class _Refit:
     def residuals(self, damper: Damper) -> Array:
         """Return the (m,) residual as a share of the record's peak."""
         simulated = respond(damper, self.record.motion, float(self.record.force[0]), 1e-7)
-        return np.asarray((self.record.force - simulated)[self.first :] / self.record.peak)
+        return self.record.missed_by(simulated)[self.first :] / self.record.peak
 
     def slopes(self, damper: Damper, x: Array) -> Array:
         """Return (m, p) derivatives of the residual by the searched variables."""

@@ -210,7 +210,7 @@ def _held_out(diagnosed: Diagnosed) -> tuple[str, ...]:
 
 def _squares(damper: Damper, record: NoiseFreeRecord, *, gains_out: bool) -> float:
     first = warm_up(record.motion.displacement)
-    force = record.force[first:]
-    simulated = respond(damper, record.motion, float(record.force[0]), 1e-7)[first:]
-    gain = float(force @ simulated / (simulated @ simulated)) if gains_out else 1.0
-    return float(np.sum((force - gain * simulated) ** 2))
+    simulated = respond(damper, record.motion, float(record.force[0]), 1e-7)
+    own = simulated[first:]
+    gain = float(record.force[first:] @ own / (own @ own)) if gains_out else 1.0
+    return float(np.sum(record.missed_by(gain * simulated)[first:] ** 2))

@@ -21,8 +21,8 @@ from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult, refit
-from pzd.diagnosis.fit.likelihood import equally_weighted, prompt_force, weighted_record
-from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
+from pzd.diagnosis.fit.likelihood import equally_weighted, residuals_of, weighted_record
+from pzd.diagnosis.fit.prediction import comparable_samples, missed_force, predicted_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.fit.cross_validation import (
     FOLDS,
@@ -381,7 +381,7 @@ class CrossValidation(Folds):
             if not kept.any():
                 continue
             force = p.record.force[kept]
-            residual = force - predicted_force(damper, p)[kept]
+            residual = missed_force(p, predicted_force(damper, p))[kept]
             negligible = residual.size * (self.visible * float(np.max(np.abs(p.record.force)))) ** 2
             if i in self.lone:
                 negligible += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
@@ -478,22 +478,14 @@ def _not_shown(problem: Problem, damper: Damper) -> list[str]:
 
     Equation: |r|^2 without it - |r|^2 < p ln n, p its parameters       Source: Schwarz 1978, Ann. Stat. 6, 461-464
     """
-    whole = _residuals(problem, damper)
+    whole = np.concatenate(residuals_of(problem.observations, damper))
 
     def shown(name: str) -> bool:
-        without, penalty = _residuals(problem, damper.without_effects(name)), np.log(whole.size)
+        without = np.concatenate(residuals_of(problem.observations, damper.without_effects(name)))
+        penalty = np.log(whole.size)
         return bool(without @ without - whole @ whole >= len(problem.unknowns((name,))) * penalty)
 
     return [name for name in damper.effects if not shown(name)]
-
-
-def _residuals(problem: Problem, damper: Damper) -> Array:
-    """Compute the (w,) residuals of a damper in all tests, in units of noise."""
-    found = []
-    for o in problem.observations:
-        force, sensors = prompt_force(o, damper)
-        found.append(o.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)[:, 0])
-    return np.concatenate(found)
 
 
 def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) -> CrossValidation:

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from pzd.damper.model import Damper
+from pzd.diagnosis.fit.likelihood import residuals_of
 from pzd.diagnosis.fit.problem import Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
 from pzd.fit.element_coordinates import ElementCoordinates
@@ -126,7 +127,14 @@ def fit(
     precision : relative change of the sum of squares at which the search ends
     """
     unknowns = problem.unknowns(effects)
-    found, left, optimum = _search(problem, unknowns, start, start.size, evaluations, precision)
+
+    def search(begin: Array) -> tuple[Array, Linearisation, Optimum]:
+        return _search(problem, unknowns, begin, start.size, evaluations, precision)
+
+    found, left, optimum = search(start)
+    if (begin := _beyond_steps(problem, unknowns, found, left)) is not None:
+        again = search(begin)
+        found, left, optimum = min((found, left, optimum), again, key=lambda each: each[2].sum_of_squares)
     limits = _bounds(problem, unknowns)
     kept = left.jacobian if sum(block.size for _, block in left.jacobian.blocks) <= LARGEST_KEPT_JACOBIAN else None
     return FitResult(
@@ -213,6 +221,60 @@ def _search(
         largest_offset=POLISHED_OFFSET,
     )
     return all_variables(found.x), linearised_at(found.x.tobytes()), found
+
+
+STEPS_OF_COMPLIANCE = (-np.inf, -4.0 * np.log(2.0), -2.0 * np.log(2.0), -np.log(2.0), np.log(2.0), 2.0 * np.log(2.0))
+"""Changes of the coordinate of 1/k by which a search is taken to the next step of the misfit: to a rigid spring, 16, 4
+and 2 times as stiff, 2 and 4 times as soft.
+
+Reason: a flank of a few samples has a step for each, and its length goes with the root of 1/k."""
+STEP_OF_MISFIT = 1.0
+"""Misfit [squares of noise] that another oil spring must gain for the search to go on from there.
+
+Reason: less tells no two springs apart."""
+
+
+def _beyond_steps(problem: Problem, unknowns: Sequence[Unknown], x: Array, left: Linearisation) -> Array | None:
+    """Return an optimum with oil springs of less misfit, to search on from; None where there are none.
+
+    Behind a stiff spring a friction turns within a few samples, and the misfit over k has a step wherever one more of
+    them changes sides: a search ends between two such steps.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    unknowns : of the effects
+    x : (3 b + e,) optimum in the units of the search
+    left : linearised there
+    """
+    rows = len(problem.base)
+    springs = x[2 : 3 * rows : 3]
+    stiff = springs < problem.unseen[2]
+    if problem.rigid or not stiff.any():
+        return None
+    low, high = (limit[2 : 3 * rows : 3] for limit in _bounds(problem, unknowns))
+
+    def misfits(residuals: Sequence[Array]) -> Array:
+        """Return the (b,) misfit of the tests of each row."""
+        found = np.zeros(rows)
+        for o, r in zip(problem.observations, residuals, strict=True):
+            if o.base_row >= 0:
+                found[o.base_row] += float(r @ r)
+        return found
+
+    best, begin = misfits(left.residuals) - STEP_OF_MISFIT, springs.copy()
+    for step in STEPS_OF_COMPLIANCE:
+        tried = np.where(stiff, np.clip(springs + step, low, high), springs)
+        at = x.copy()
+        at[2 : 3 * rows : 3] = tried
+        found = misfits(residuals_of(problem.observations, problem.point(at, unknowns).damper))
+        better = found < best
+        best, begin = np.where(better, found, best), np.where(better, tried, begin)
+    if np.array_equal(begin, springs):
+        return None
+    at = x.copy()
+    at[2 : 3 * rows : 3] = begin
+    return at
 
 
 def _prior(problem: Problem, effects: int) -> Array:

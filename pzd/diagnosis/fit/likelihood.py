@@ -351,6 +351,15 @@ def shown_force(observation: WeightedRecord, damper: Damper) -> Array:
     return observation.through_sensors(*prompt_force(observation, damper))
 
 
+def residuals_of(observations: Sequence[WeightedRecord], damper: Damper) -> list[Array]:
+    """Compute the residuals (w,) of a damper in each test, in units of noise."""
+    found = []
+    for o in observations:
+        force, sensors = prompt_force(o, damper)
+        found.append(o.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)[:, 0])
+    return found
+
+
 # --- Weights of a record
 
 
