@@ -93,11 +93,9 @@ def check_residual(
         near_jumps = _nuisance_near_jumps(force, late, size, timing, closed=run is not None)
         return late - predicted + np.where(mask & ~calm, near_jumps, size + timing)
 
-    ways = [explained_with(predicted)]
-    if prepared.constant:
-        # A delay of more than a sample moves a flank; a jump between two samples it moves to chance.
-        delay = likely_delay(force[mask], lambda late: shifted(late)[mask], variance, config, calm[mask])
-        ways.append(explained_with(shifted(delay)))
+    # A delay of more than a sample moves a flank; a jump between two samples it moves to chance.
+    delay = likely_delay(force[mask], lambda late: shifted(late)[mask], variance, config, calm[mask])
+    ways = explained_with(predicted), explained_with(shifted(delay))
     explained = mains + min(ways, key=lambda way: float(np.sum((without - way)[mask] ** 2)))
     folded = _folded(prepared, residual - explained, mask)
     if folded is not None:

@@ -37,7 +37,9 @@ from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visibl
 from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
+from pzd.diagnosis.predictive_search import improves
 from pzd.diagnosis.search.acceptance import Selection
+from pzd.diagnosis.search.candidates import candidate, converged
 from pzd.diagnosis.search.determination import first_undetermined
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.support import support_of
@@ -100,7 +102,9 @@ def diagnose_setting(
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
     if insufficient_data(campaign):
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
-    judged = _with_zeros_of_tests(_judged(campaign, baseline, diagnose, control.unit), baseline, diagnose, control.unit)
+    judged = _judged(campaign, baseline, diagnose, control.unit)
+    judged = _with_zeros_of_tests(judged, baseline, diagnose, control.unit)
+    judged = _with_one_alone(judged, baseline, diagnose, control.unit)
     campaign, validation = judged.campaign, judged.validation
     adoption, decision = conclude(judged.conclusion, validation, diagnose)
     support = support_of(adoption, validation)
@@ -172,8 +176,8 @@ class _Judged:
 
 def _judged(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
     """Select effects, and judge them."""
-    validation = cross_validation_of(campaign, baseline, config.visible)
     selected = _selected(campaign, baseline, config, campaign.jobs)
+    validation = cross_validation_of(campaign, baseline, config.visible)
     return _Judged(campaign, validation, judge(selected, validation, config, unit))
 
 
@@ -199,6 +203,43 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
         return first
     told = f"; the zero of the load cell differs from test to test, by {np.ptp(zeros):.2g} N in all"
     return replace(again, zeros=told)
+
+
+ALONE = "alone it leaves nothing, and nothing else explains the tests"
+
+
+def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+    """Judge again with one of the effects that are named where alone they leave nothing, if one does.
+
+    Such a law has taken part of much that is missing, but whole of little: what it closes in every test, with values
+    that the tests determine, and predicts in those kept back, is what the damper does. Another one of them that closes
+    it as well is its rival.
+    """
+    adoption, decision = first.conclusion
+    selection, evidence = adoption.selection, adoption.selection.initial_evidence
+    if decision.verdict != "unexplained" or config.force:
+        return first
+    whole, plain = evidence.whole, selection.baseline
+    names = [e.name for e in library().values() if e.named_alone and e.name not in config.forbid]
+    tried = [converged(whole, plain, candidate(whole, plain, library()[name])) for name in names]
+    closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
+    for each in sorted(closing, key=lambda c: c.delta_bic):
+        only = config.model_copy(update={"force": (each.effect,), "most_effects": 1})
+        selected = select_effects(first.campaign, baseline, only, first.campaign.jobs, forced_because=ALONE)
+        again, found = judge(selected, first.validation, only, unit)
+        kept = again.selection
+        if (
+            found.verdict in ("named", "ambiguous")
+            and kept.adopted == (each.effect,)
+            and improves(again.error, again.baseline_error, first.validation)
+            and not first_undetermined(kept.final_evidence.whole, kept.fitted, ())
+        ):
+            alike = [c.effect for c in closing if c is not each and c.delta_bic - each.delta_bic < config.rival_bic]
+            if alike:
+                words = f"{found.reason}; {' and '.join(alike)} would do as well on these tests"
+                found = replace(found, verdict="ambiguous", reason=words, possible=(*found.possible, *alike))
+            return replace(first, conclusion=(again, found))
+    return first
 
 
 def fitted_to_all(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Selection:

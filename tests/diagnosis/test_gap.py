@@ -192,14 +192,16 @@ DAMPER = Damper(
 )
 
 
-def late_sweep(voltage: Array, rng: Generator) -> Record:
+def late_sweep(
+    voltage: Array, rng: Generator, damper: Damper = DAMPER, late: float = LATE, noise: float = NOISE
+) -> Record:
     """A sweep from 0.5 to 4 Hz whose force comes late, at a voltage (n,) on the fine grid."""
     fine = np.arange(-LEAD, DURATION, 1.0 / (RATE * FINER))
     x = 0.012 * np.sin(2.0 * np.pi * (0.5 * fine + 0.5 * 3.5 / DURATION * fine**2))
     v = np.gradient(x, fine)
-    force = respond(DAMPER, Motion(fine, x, v, np.gradient(v, fine), voltage))
+    force = respond(damper, Motion(fine, x, v, np.gradient(v, fine), voltage))
     seen = slice(round(LEAD * RATE) * FINER, None, FINER)
-    t, measured = fine[seen], np.interp(fine[seen] - LATE, fine, force) + NOISE * rng.standard_normal(fine[seen].size)
+    t, measured = fine[seen], np.interp(fine[seen] - late, fine, force) + noise * rng.standard_normal(fine[seen].size)
     clean = kinematics(t, x[seen], None)
     return Record("sweep", None, t, x[seen], clean.velocity, clean.acceleration, measured, voltage[seen])
 
@@ -237,6 +239,20 @@ def test_a_test_that_comes_late_shows_no_gap_beside_what_is_kept_back(
 def test_a_test_that_comes_late_shows_no_gap_beside_steps_of_the_voltage(every: float, rng: Generator) -> None:
     record = late_sweep(switching(every), rng)
     assert probability(record, np.ones(record.time.size, dtype=np.bool_)) > 1e-3
+
+
+def test_a_flank_of_few_samples_that_comes_late_is_no_gap_though_the_voltage_steps(rng: Generator) -> None:
+    """Behind a stiff oil spring: half a sample late, the slope of the force is another one."""
+    stiff = Damper(
+        base=(
+            BaseRow(voltage_V=0.0, T0_N=123.0, C_Ns_per_m=5.0, k_N_per_m=4.4e6),
+            BaseRow(voltage_V=150.0, T0_N=305.0, C_Ns_per_m=6.0, k_N_per_m=5.9e6),
+        )
+    )
+    (prepared,) = prepare((late_sweep(switching(0.4), rng, stiff, late=0.0012, noise=1.5),))
+    everything, config = np.ones(prepared.record.time.size, dtype=np.bool_), NuisanceConfig()
+    check = check_residual(predict(stiff, prepared, config.delay_s), prepared, everything, config)
+    assert visible_gap([check]) < 0.0005
 
 
 def test_the_force_of_a_delay_is_its_slope_on_either_side_of_what_is_left_out() -> None:

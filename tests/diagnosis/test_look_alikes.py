@@ -18,7 +18,7 @@ from pzd.diagnosis.search.acceptance import has_come_down_to, rivals_of
 from pzd.diagnosis.search.candidates import candidate, converged
 from pzd.diagnosis.search.determination import nearly_others
 from pzd.diagnosis.search.forward_selection import reweighted, swap_step
-from pzd.record import Record
+from pzd.record import Array, Record
 
 ONE_STROKE = ((0.5, 0.02), (2.0, 0.02))
 SEVERAL = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -176,6 +176,40 @@ def test_a_pocket_is_searched_to_the_end_of_its_valley_where_the_weights_change(
     for parameter, error in zip(("d_c", "F_c"), errors, strict=True):
         true = truth.effects["cavitation"][parameter]
         assert abs(found.damper.effects["cavitation"][parameter] - true) < 3.5 * error < 0.5 * true
+
+
+BESIDE: dict[str, dict[str, float]] = {
+    "second_branch": {"T0_2": 60.0, "k_2": 3e4},
+    "bouc_wen": {"F_h": 80.0, "x_h": 1.5e-3, "sigma": 2.0},
+}
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_a_branch_is_named_where_alone_it_leaves_nothing(name: str, rng: np.random.Generator) -> None:
+    row = BaseRow(voltage_V=0.0, T0_N=80.0, C_Ns_per_m=1500.0, k_N_per_m=1e6)
+    truth = Damper(base=(row,), effects={name: BESIDE[name]})
+    found = diagnosed(sines(truth, rng, (0.0,), tests=SEVERAL, noise=3e-3, cycles=5, jitter=0.003))
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("named", (name,)), found.diagnosis.reason
+    assert found.damper.effects[name] == pytest.approx(BESIDE[name], rel=0.05)
+
+
+def dahl(record: Record, force: float, stiffness: float) -> Array:
+    """Friction of Dahl along a displacement: dF/dx = s (1 - F/F_0 sign(dx)), as no law of the library."""
+    finer, found, at = 40, np.zeros(record.time.size), 0.0
+    for _ in range(2):  # the first time to settle
+        for i, step in enumerate(np.diff(record.displacement) / finer, start=1):
+            for _ in range(finer):
+                at += stiffness * step * (1.0 - at / force * np.sign(step))
+            found[i] = at
+    found[0] = found[1]
+    return found
+
+
+def test_a_friction_of_another_shape_is_no_branch(rng: np.random.Generator) -> None:
+    row = BaseRow(voltage_V=0.0, T0_N=80.0, C_Ns_per_m=1500.0, k_N_per_m=1e6)
+    plain = sines(Damper(base=(row,)), rng, (0.0,), tests=SEVERAL, noise=3e-3, cycles=5, jitter=0.003)
+    told = diagnosed([replace(r, force=r.force + dahl(r, 60.0, 4e4)) for r in plain]).diagnosis
+    assert told.verdict == "unexplained", told.reason
 
 
 def test_what_rubber_gives_is_no_gas_spring_of_one_rate(rng: np.random.Generator) -> None:

@@ -58,6 +58,7 @@ EFFECT = Effect(
     ),
     hidden=_hidden,
     imitates=True,
+    named_alone=True,
     never_named="whatever friction builds up over a travel has its loop: the yield of a magneto-rheological fluid, a "
     "lip, rubber; and T0 takes up most of it, so that the name would rest on the rounding of its flank alone",
 )

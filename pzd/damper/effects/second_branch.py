@@ -34,6 +34,7 @@ EFFECT = Effect(
         ({"deflection": 1.5e-3, "k_2": 5.0e4}, 75.0),
     ),
     imitates=True,
+    named_alone=True,
     never_named="whatever slips at a force of its own has its shelf: a lip, a rubber seat, the yield of a fluid or a "
     "mount; which of these it stands for, the force does not show",
 )

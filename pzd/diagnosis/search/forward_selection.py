@@ -117,7 +117,13 @@ log = logging.getLogger(__name__)
 
 
 def select_effects(
-    campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1, *, rows_by_temperature: bool = False
+    campaign: Campaign,
+    damper: Damper,
+    config: DiagnoseConfig,
+    jobs: int = 1,
+    *,
+    rows_by_temperature: bool = False,
+    forced_because: str = "the config asks for it",
 ) -> Selection:
     """Adopt effects one after another while the next improves the fit, is supported by itself, and a gap is left.
 
@@ -128,6 +134,7 @@ def select_effects(
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     rows_by_temperature : whether T0, C and k stay those of each temperature, whatever rows of a voltage would pay
+    forced_because : why the forced effects are adopted
     """
     weigh = partial(evidence_of, campaign)
     evidence = weigh(damper)
@@ -137,7 +144,7 @@ def select_effects(
     if not rows_by_temperature:
         search.choose_temperature_axis()
     initial_evidence, search.baseline = search.evidence, search.current
-    search.adopt_forced()
+    search.adopt_forced(forced_because)
     while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():
         pass
     search.swap()
@@ -210,11 +217,12 @@ class _ForwardSelection:
         if self.evidence.gap(rigid) < self.evidence.gap(self.current):
             self.current = rigid
 
-    def adopt_forced(self) -> None:
-        """Adopt what the config asks for."""
+    def adopt_forced(self, because: str) -> None:
+        """Adopt what is asked for."""
         for name in self.config.force:
-            self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
-            self.reasons[name] = "adopted because the config asks for it"
+            whole, before = self.evidence.whole, self.current
+            self.current = converged(whole, before, candidate(whole, before, library()[name])).fitted
+            self.reasons[name] = f"adopted because {because}"
 
     def choose_temperature_axis(self) -> None:
         """Keep rows by temperature where they improve the criterion more than an effect; else one per voltage.
