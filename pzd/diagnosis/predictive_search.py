@@ -123,7 +123,8 @@ class PredictiveSearch:
             yield self._exchanges(current)
         if budget.allows_more():
             last = self._further(current.problem, current.fitted, thresholds.SCREENED_EFFECTS, asked_last=True)
-            yield self._possible(current.problem, last)
+            # By several numbers, that six evaluations do not find.
+            yield [self._searched_on(each) for each in self._possible(current.problem, last)]
         if budget.allows_more():
             yield self._one_for_several(current)
 

@@ -6,8 +6,9 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from synthetic import campaign_of, damper_of, sine
+from synthetic import campaign_of, damper_of, diagnosed, sine, sines
 
+from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, Tried, _Proposal, as_good, loses_between
@@ -99,3 +100,17 @@ def test_two_forces_that_cancel_at_their_optimum_are_no_step(
     found = search._best(CriterionFit(*here, *errors), [_Proposal.of(*further, validation)])
     assert (found is not None) is taken
     assert search.off == (set() if taken else {effect})
+
+
+def test_damping_along_the_stroke_predicts_kept_back_tests_though_six_evaluations_do_not_find_it(
+    rng: np.random.Generator,
+) -> None:
+    row = BaseRow(voltage_V=0.0, T0_N=80.0, C_Ns_per_m=1500.0, k_N_per_m=1e6)
+    zone = {"c_p": 400.0, "x_p": 0.005, "b_p": 0.012}
+    truth = Damper(base=(row,), effects={"position_damping": zone})
+    tests = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
+    found = diagnosed(sines(truth, rng, (0.0,), tests=tests, noise=3e-3, cycles=5, jitter=0.003))
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("unexplained", ("position_damping",))
+    assert found.damper.effects["position_damping"] == pytest.approx(zone, rel=0.05)
+    assert found.diagnosis.prediction is not None
+    assert found.diagnosis.prediction.W_s < 0.05 * found.diagnosis.prediction.W_s_plain
