@@ -53,7 +53,7 @@ figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
 	$(BIN)/pzd figures configs/paper.yaml
 
 .PHONY: blind
-blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdicts can be trusted; an hour
+blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdicts can be trusted; three hours
 	$(BIN)/pzd blind configs/blind.yaml
 
 .PHONY: blind-motions

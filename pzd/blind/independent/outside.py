@@ -276,7 +276,7 @@ POLYTROPIC_GAS = Law(
 def branch_force(force: float, travel: float, T0_2: float, k_2: float) -> float:
     """Return the force [N] of a second elasto-plastic element after a travel of the rod to one side [m].
 
-    The library has this effect, but no verdict names it.
+    The library has this effect; a verdict names it where alone it leaves nothing.
 
     Equation: dF_2/dt = k_2 dx/dt, |F_2| <= T0_2 (Maxwell slip)     Source: Iwan 1966, J. Appl. Mech. 33(4)
     """
@@ -295,7 +295,7 @@ SECOND_BRANCH = Law("second_branch", _draw_second_branch, described_by=("second_
 def hysteresis_rate(z: float, speed: float, x_h: float, sigma: float) -> float:
     """Return the rate [1/s] of the hysteretic variable of Bouc and Wen, of which 1 is the ultimate force.
 
-    The library has this effect, but no verdict names it.
+    The library has this effect; a verdict names it where alone it leaves nothing.
 
     Equation: x_h dz/dt = v - beta |v| |z| z - gamma v z^2, beta = sigma, gamma = 1 - sigma
     Source: Wen 1976, J. Eng. Mech. Div. ASCE 102(2), n = 2, A = beta + gamma = 1
