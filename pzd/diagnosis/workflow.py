@@ -22,7 +22,7 @@ from pzd.artefacts import (
     base_of,
 )
 from pzd.damper.effect import Parameter
-from pzd.damper.effects import library
+from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import data, next_test, thresholds
@@ -104,9 +104,14 @@ def diagnose_setting(
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
     judged = _judged(campaign, baseline, diagnose, control.unit)
     judged = _with_zeros_of_tests(judged, baseline, diagnose, control.unit)
-    judged = _with_one_alone(judged, baseline, diagnose, control.unit)
+    alone = [effect.name for effect in library().values() if effect.named_alone]
+    judged = _with_one_alone(judged, alone, baseline, diagnose, control.unit)
     campaign, validation = judged.campaign, judged.validation
     adoption, decision = conclude(judged.conclusion, validation, diagnose)
+    if decision.verdict == "unexplained" and len(found := adoption.selection.adopted) == 1 and found[0] in nameable():
+        again = _with_one_alone(judged, found, baseline, diagnose, control.unit)
+        if again is not judged:
+            adoption, decision = conclude(again.conclusion, validation, diagnose)
     support = support_of(adoption, validation)
     decision = with_parts_told(decision, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
@@ -208,20 +213,30 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
 ALONE = "alone it leaves nothing, and nothing else explains the tests"
 
 
-def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
-    """Judge again with one of the effects that are named where alone they leave nothing, if one does.
+def _with_one_alone(
+    first: _Judged, names: Sequence[str], baseline: Damper, config: DiagnoseConfig, unit: str
+) -> _Judged:
+    """Judge again with one of some effects where what is missing has no name, if alone it leaves nothing.
 
-    Such a law has taken part of much that is missing, but whole of little: what it closes in every test, with values
+    A law may take part of much that is missing, but the whole of little: what it closes in every test, with values
     that the tests determine, and predicts in those kept back, is what the damper does. Another one of them that closes
     it as well is its rival.
+
+    Parameters
+    ----------
+    first : judgement without them
+    names : of the effects
+    baseline : damper without effects
+    config : thresholds, forced and forbidden effects
+    unit : of the control signal, for the reason
     """
     adoption, decision = first.conclusion
     selection, evidence = adoption.selection, adoption.selection.initial_evidence
     if decision.verdict != "unexplained" or config.force:
         return first
     whole, plain = evidence.whole, selection.baseline
-    names = [e.name for e in library().values() if e.named_alone and e.name not in config.forbid]
-    tried = [converged(whole, plain, candidate(whole, plain, library()[name])) for name in names]
+    wanted = [library()[name] for name in names if name not in config.forbid]
+    tried = [converged(whole, plain, candidate(whole, plain, effect)) for effect in wanted]
     closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
     for each in sorted(closing, key=lambda c: c.delta_bic):
         only = config.model_copy(update={"force": (each.effect,), "most_effects": 1})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -120,15 +120,20 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     return MAY_BE_TEST_SCATTER if max(size for size, _ in sizes) >= 1.0 else WITHIN_TEST_SCATTER
 
 
-def late_or_elastic(problem: Problem, before: FitResult, config: DiagnoseConfig) -> bool:
+def late_or_elastic(
+    weigh: Callable[[Damper], Evidence], problem: Problem, before: FitResult, config: DiagnoseConfig
+) -> bool:
     """Whether a force that is recorded late beside rigid oil springs would do as well as the springs.
 
     At one frequency a viscous damper behind a spring lags as a late force does. A friction shows the spring in its
-    flank, where samples resolve it.
+    flank, where samples resolve it; where they do not, its jump lies elsewhere by either damper, and the weights of the
+    one count that of the other as a gap. So the late force is also asked by its own: whether it leaves less by them
+    than the springs do, and as little as these by theirs.
 
     Parameters
     ----------
-    problem : observations and starting values
+    weigh : gives the evidence weighed by what a damper leaves
+    problem : observations and starting values, weighed by what the springs leave
     before : optimum without effects
     config : how near a rival comes
     """
@@ -139,10 +144,20 @@ def late_or_elastic(problem: Problem, before: FitResult, config: DiagnoseConfig)
     if least_squares.fit(rigid, (), before.optimum).misfit - before.misfit < config.rival_bic:
         return False  # the tests do not show the springs
     late = least_squares.fit(rigid, (effect.name,), start)
-    fewer = before.optimum.size - (late.optimum.size - len(rigid.base))
-    pays = late.misfit - before.misfit - fewer * float(np.log(late.size))
     natural = not against_nature(late.damper) and late.unknowns[-1].value_in(late.damper) > 0.0
-    return natural and pays < config.rival_bic and trivial(late, effect.name, rigid.scales.low_force) is None
+    if not natural or trivial(late, effect.name, rigid.scales.low_force) is not None:
+        return False
+
+    def pays(late: FitResult, springs: FitResult) -> float:
+        fewer = springs.optimum.size - (late.optimum.size - len(problem.base))
+        return late.misfit - springs.misfit - fewer * float(np.log(late.size))
+
+    if pays(late, before) < config.rival_bic:
+        return True
+    own = weigh(late.damper)
+    again = least_squares.fit(replace(own.whole, rigid=True), (effect.name,), late.optimum)
+    leaves_less = pays(again, least_squares.refit(own.whole, before.damper)) < -config.rival_bic
+    return leaves_less and pays(again, before) < config.rival_bic and not own.gap_is_significant(again, config)
 
 
 def spurious(

@@ -466,7 +466,7 @@ class _ForwardSelection:
                 if each.delta_bic <= lenient.adopt_bic:
                     self.reasons[each.effect] = self._refused(lenient, each) or acceptance.MAY_BE_CHANCE
         explained = not self.evidence.gap_is_significant(self.current, self.config)
-        if explained and acceptance.late_or_elastic(self.evidence.whole, self.current, self.config):
+        if explained and acceptance.late_or_elastic(self.weigh, self.evidence.whole, self.current, self.config):
             self.reasons["sensor_delay"] = acceptance.LATE_OR_ELASTIC
         undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE, acceptance.LATE_OR_ELASTIC
         return tuple(name for name, why in self.reasons.items() if why in undecided)
