@@ -22,7 +22,7 @@ from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, residuals_of, weighted_record
-from pzd.diagnosis.fit.prediction import comparable_samples, missed_force, predicted_force
+from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.fit.cross_validation import (
     FOLDS,
@@ -381,7 +381,7 @@ class CrossValidation(Folds):
             if not kept.any():
                 continue
             force = p.record.force[kept]
-            residual = missed_force(p, predicted_force(damper, p))[kept]
+            residual = force - predicted_force(damper, p)[kept]
             negligible = residual.size * (self.visible * float(np.max(np.abs(p.record.force)))) ** 2
             if i in self.lone:
                 negligible += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))

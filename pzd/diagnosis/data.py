@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Rig
-from pzd.record import Array, Mask, Record, conditions, distinct, is_constant, sliced, voltage_scale
+from pzd.record import Array, Record, conditions, distinct, is_constant, sliced, voltage_scale
 from pzd.signals.average_cycle import AverageCycle, Motion
 from pzd.signals.cycles import Cycles, cycles, cycles_of, settled_cycles
-from pzd.signals.jumps import denoised_control, unresolved_flanks
-from pzd.signals.measures import resolution, reversals
+from pzd.signals.jumps import denoised_control
+from pzd.signals.measures import resolution
 from pzd.signals.segmentation import separate_tests
 from pzd.signals.smoothing import HIGHEST, cut_above, low_pass, motion_below, resolved_below
 
@@ -78,11 +78,6 @@ class PreparedRecord:
             return np.zeros(0), np.zeros(0), np.zeros(0)
         time, of = self.record.time, self.cycles.mean
         return of(time, self.record.displacement), of(time, self.record.velocity), of(time, self.record.acceleration)
-
-    @cached_property
-    def unresolved_flanks(self) -> Mask:
-        """(n,) samples from a reversal to a jump of the force within one interval, whose instant is chance."""
-        return unresolved_flanks(self.record.force, reversals(self.record.displacement), self.record.rate)
 
     @property
     def lead_samples(self) -> int:

@@ -16,7 +16,7 @@ from pzd.damper.model import Damper
 from pzd.diagnosis import narx
 from pzd.diagnosis.cross_validation import Folds, assign_folds
 from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
-from pzd.diagnosis.fit.prediction import comparable_samples, missed_force
+from pzd.diagnosis.fit.prediction import comparable_samples
 from pzd.diagnosis.narx import Order
 from pzd.diagnosis.peers import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion, peers
 from pzd.fit.cross_validation import PredictionError, squared_sums
@@ -239,8 +239,7 @@ class HeldOutTests:
             force = self.prepared[i].record.force[kept]
             if force.any():
                 records.append(i)
-                missed = missed_force(self.prepared[i], predicted(i))[kept]
-                entries.append((*squared_sums(force, missed), 0.0))
+                entries.append((*squared_sums(force, force - predicted(i)[kept]), 0.0))
         return PredictionError.of_entries(records, entries)
 
 

@@ -342,6 +342,18 @@ def running(process: int) -> bool:
     return True
 
 
+def test_when_within_a_sample_a_friction_turns_is_no_gap() -> None:
+    """A spring of a micrometre decides whether the sample at a reversal has the force from before it or from after."""
+    t, w = np.arange(0.001, 4.0, 0.002), 2.0 * np.pi
+    motion = Motion(t, 0.02 * np.sin(w * t), 0.02 * w * np.cos(w * t), -0.02 * w**2 * np.sin(w * t))
+    force = 300.0 * np.sign(motion.velocity) + 100.0 * motion.velocity
+    record = NoiseFreeRecord(motion, force, force)
+    sooner, much_sooner = np.roll(force, 1), np.roll(force, 8)
+    assert np.max(np.abs(force - sooner)) > 500.0
+    assert np.max(np.abs(record.missed_by(sooner))) < 0.02 * 300.0
+    assert np.max(np.abs(record.missed_by(much_sooner))) > 500.0
+
+
 def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_changes() -> None:
     row = BaseRow(T0_N=500.0, C_Ns_per_m=3000.0, k_N_per_m=3e5)
     plain = Damper(base=(row,))

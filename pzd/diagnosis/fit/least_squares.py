@@ -234,6 +234,12 @@ STEP_OF_MISFIT = 1.0
 Reason: less tells no two springs apart."""
 
 
+AS_NOISE = 2.0
+"""Misfit a residual up to which a row is taken beyond steps.
+
+Reason: where a law is missing all misfits are larger, and a step of them is no flank; not tuned."""
+
+
 def _beyond_steps(problem: Problem, unknowns: Sequence[Unknown], x: Array, left: Linearisation) -> Array | None:
     """Return an optimum with oil springs of less misfit, to search on from; None where there are none.
 
@@ -250,8 +256,6 @@ def _beyond_steps(problem: Problem, unknowns: Sequence[Unknown], x: Array, left:
     rows = len(problem.base)
     springs = x[2 : 3 * rows : 3]
     stiff = springs < problem.unseen[2]
-    if problem.rigid or not stiff.any():
-        return None
     low, high = (limit[2 : 3 * rows : 3] for limit in _bounds(problem, unknowns))
 
     def misfits(residuals: Sequence[Array]) -> Array:
@@ -262,7 +266,11 @@ def _beyond_steps(problem: Problem, unknowns: Sequence[Unknown], x: Array, left:
                 found[o.base_row] += float(r @ r)
         return found
 
-    best, begin = misfits(left.residuals) - STEP_OF_MISFIT, springs.copy()
+    here, counts = misfits(left.residuals), misfits([np.ones(r.size) for r in left.residuals])
+    stiff &= here <= AS_NOISE * counts
+    if problem.rigid or not stiff.any():
+        return None
+    best, begin = here - STEP_OF_MISFIT, springs.copy()
     for step in STEPS_OF_COMPLIANCE:
         tried = np.where(stiff, np.clip(springs + step, low, high), springs)
         at = x.copy()

@@ -87,17 +87,6 @@ def end_temperatures(temperature: Array) -> tuple[float, float]:
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
-def missed_force(prepared: PreparedRecord, predicted: Array) -> Array:
-    """Compute what a predicted force misses of a record (n,) [N]; of a jump within one sample, not when.
-
-    A friction behind a stiff spring turns within a micrometre, so that the sample at a reversal has the force from
-    before it or from after by chance: a few such samples would outweigh all others.
-    """
-    force, flanks = prepared.record.force, prepared.unresolved_flanks
-    missed = force - predicted
-    return np.where(flanks, missed - jump_timing_error(force, predicted), missed) if flanks.any() else missed
-
-
 def comparable_samples(prepared: PreparedRecord) -> NDArray[np.bool_]:
     """Return (n,) whether a prediction can be compared with a sample.
 
