@@ -263,6 +263,7 @@ FAULTS: dict[str, Callable[[Record], Record]] = {
     "delay": lambda one: replace(one, force=np.roll(one.force, 12)),
     "drift": lambda one: replace(one, force=one.force + np.linspace(0.0, 0.2, one.time.size) * np.ptp(one.force)),
     "dropouts": lambda one: replace(one, force=np.where(np.arange(one.time.size) % 700 == 5, 0.0, one.force + 900.0)),
+    "fade": lambda one: replace(one, force=one.force * np.exp(-0.3 * one.time / one.time[-1])),
     "gain_step": lambda one: replace(one, force=one.force * np.where(one.time > 0.5 * one.time[-1], 1.1, 1.0)),
     "held_channel": lambda one: replace(one, force=one.force[np.arange(one.time.size) // 10 * 10]),
     "hum": lambda one: replace(one, force=one.force + 0.1 * np.ptp(one.force) * np.sin(100.0 * np.pi * one.time)),

@@ -19,7 +19,7 @@ from pzd.rig.config import Limits
 from pzd.rig.preflight import Check, PreflightRecord, findings
 from pzd.rig.preflight.amplifier import amplifier, drop_contradicting_filters, drop_contradicting_ranges
 from pzd.rig.preflight.force import delay
-from pzd.rig.preflight.sensors import drift, dropouts, gain_step, held_channel, quantisation
+from pzd.rig.preflight.sensors import drift, dropouts, fade, gain_step, held_channel, quantisation
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -197,6 +197,24 @@ def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rn
             about = float(finding.where.split("about ")[1].split(" s")[0])
             assert about == pytest.approx(half, abs=1.1 / damper.frequency)
     assert told >= 0.85 * DRAWS
+
+
+@pytest.mark.parametrize("change", [-0.28, 0.3, -0.03])
+def test_a_force_that_fades_is_told_with_its_change(change: float, rng: np.random.Generator) -> None:
+    """Most of it in the first cycles, as oil warms; what warming of a few kelvin does is not told."""
+    told = []
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        share = (1.0 - np.exp(-2.0 * record.time / record.time[-1])) / (1.0 - np.exp(-2.0))
+        faded = replace(record, force=record.force * (1.0 + change * share))
+        assert sizes([faded], gain_step) == []
+        told += [finding.size for finding in sizes([faded], fade)]
+    if abs(change) < 0.1:
+        assert told == []
+    else:
+        assert len(told) >= 0.8 * DRAWS
+        # The first cycle and the last are compared, and the first is left out as a start.
+        assert all(0.4 * abs(change) < abs(size) < 1.15 * abs(change) and size * change > 0.0 for size in told)
 
 
 @pytest.mark.parametrize("told_at", [5, 8])

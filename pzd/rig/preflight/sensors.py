@@ -181,6 +181,8 @@ CYCLES = 6
 """Cycles from which a change from one to the next is told from their scatter; the first may be a start from rest."""
 LEAST_GAIN = 0.03
 """Least step of the gain that is reported; calibrations are good to 1 %."""
+LEAST_FADE = 0.1
+"""Least change of the force over a test that is reported: a damper that warms by a few kelvin stays below."""
 LEAST_DRIFT = 0.02
 """Least drift of the zero over the record that is reported, as a share of half the range of the force."""
 CLEAR = 6.0
@@ -195,20 +197,27 @@ BETTER = 4.0
 """A step is one where a steady change leaves this many times as much of the squares."""
 
 
+def _sizes_by_cycle(test: PreflightRecord) -> Array | None:
+    """Return the logarithm of the force's r.m.s. in each cycle but the first; None where the cycles are no repeats."""
+    run = test.cycles
+    if run is None or run.count < CYCLES:
+        return None
+    folded = run.fold(test.record.time, test.record.force)[1:]
+    moved = run.fold(test.record.time, test.clean.displacement)[1:]
+    sizes, strokes = folded.std(axis=1), moved.std(axis=1)
+    if sizes.min() <= 0.0 or np.ptp(strokes) > LEAST_GAIN * strokes.mean():
+        return None
+    return np.asarray(np.log(sizes))
+
+
 def gain_step(test: PreflightRecord) -> Iterator[Finding]:
     """Find a force that from one cycle on is larger or smaller by a factor, the motion being the same.
 
     Equation: log of the force's r.m.s. of a cycle = a before and b after a cycle     Source: least squares
     """
-    run = test.cycles
-    if run is None or run.count < CYCLES:
+    run, course = test.cycles, _sizes_by_cycle(test)
+    if run is None or course is None:
         return
-    folded = run.fold(test.record.time, test.record.force)[1:]
-    moved = run.fold(test.record.time, test.clean.displacement)[1:]
-    sizes, strokes = folded.std(axis=1), moved.std(axis=1)
-    if sizes.min() <= 0.0 or np.ptp(strokes) > LEAST_GAIN * strokes.mean():
-        return
-    course = np.log(sizes)
     # A change inside a cycle makes one of a size between, which belongs to neither level.
     left = [_squares(course[:n]) + _squares(course[n + 1 :]) for n in range(1, course.size - 1)]
     between = int(np.argmin(left)) + 1
@@ -226,6 +235,30 @@ def gain_step(test: PreflightRecord) -> Iterator[Finding]:
             size=float(np.exp(step)),
             unit="-",
             follows="times as large as before: an amplifier's range or a loose cell; neither part is known to be right",
+        )
+
+
+def fade(test: PreflightRecord) -> Iterator[Finding]:
+    """Find a force that grows or falls from cycle to cycle by a factor, the motion being the same.
+
+    Equation: log of the force's r.m.s. of a cycle = a + b n + c n^2, by c where it is clear     Source: least squares
+    """
+    run, course = test.cycles, _sizes_by_cycle(test)
+    if run is None or course is None or any(gain_step(test)):
+        return
+    order = np.arange(course.size, dtype=np.float64)
+    bent = np.polyval(np.polyfit(order, course, 2), order)
+    scatter = np.sqrt(float(np.sum((course - bent) ** 2)) / (course.size - 3))
+    change = float(bent[-1] - bent[0])
+    # At either end of a parabola the error is three times that of the mean.
+    error = scatter * 3.0 * np.sqrt(2.0 / course.size) + 1e-6
+    if abs(change) > np.log1p(LEAST_FADE) and abs(change) > CLEAR * error:
+        yield Finding(
+            check="fade",
+            where=f"force, from the first to the last of {counted(run.count, 'cycle')}, the motion being the same",
+            size=float(np.exp(change)) - 1.0,
+            unit="-",
+            follows="the damper changes in the test, as where oil warms or foams: T0, C and k are those of the mean",
         )
 
 
@@ -262,4 +295,4 @@ def _squares(values: Array) -> float:
     return float(np.sum((values - values.mean()) ** 2)) if values.size else 0.0
 
 
-CHECKS = (quantisation, held_channel, dropouts, gain_step, drift)
+CHECKS = (quantisation, held_channel, dropouts, gain_step, fade, drift)
