@@ -214,7 +214,7 @@ def test_a_force_that_fades_is_told_with_its_change(change: float, rng: np.rando
     else:
         assert len(told) >= 0.8 * DRAWS
         # The first cycle and the last are compared, and the first is left out as a start.
-        assert all(0.4 * abs(change) < abs(size) < 1.15 * abs(change) and size * change > 0.0 for size in told)
+        assert all(0.35 * abs(change) < abs(size) < 1.15 * abs(change) and size * change > 0.0 for size in told)
 
 
 @pytest.mark.parametrize("told_at", [5, 8])
