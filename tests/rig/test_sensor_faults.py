@@ -217,6 +217,17 @@ def test_a_force_that_fades_is_told_with_its_change(change: float, rng: np.rando
         assert all(0.35 * abs(change) < abs(size) < 1.15 * abs(change) and size * change > 0.0 for size in told)
 
 
+@pytest.mark.parametrize("course", ["steps", "ramp"])
+def test_a_force_that_follows_its_control_signal_neither_steps_nor_fades(course: str, rng: np.random.Generator) -> None:
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        share = record.time / record.time[-1]
+        share = np.where(share > 0.5, 1.0, 0.0) if course == "steps" else share
+        moving = replace(record, force=record.force * (1.0 + share), voltage=100.0 * share)
+        assert sizes([moving], gain_step) == sizes([moving], fade) == []
+        assert sizes([replace(moving, voltage=None)], gain_step) or sizes([replace(moving, voltage=None)], fade)
+
+
 @pytest.mark.parametrize("told_at", [5, 8])
 def test_a_drift_is_told_of_few_cycles_as_well_and_noise_alone_is_none(told_at: int, rng: np.random.Generator) -> None:
     """A line of 30 N in 300 N, noise of 3 N, in sines of so many cycles."""
