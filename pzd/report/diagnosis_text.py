@@ -151,10 +151,22 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
         yield f"left out: {_number(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
 
 
+COUNTED_FROM_ZERO = {
+    ("end_stop", "x_e"): "to either side of",
+    ("position_damping", "x_p"): "counted from",
+    ("accumulator", "L"): "counted from",
+}
+"""Parameters that are a place, by effect: counted from `Diagnosis.zero_m`, in these words."""
+
+
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
     values = diagnosis.parameters.get(effect, {})
-    text = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
-    return f"{text} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else text
+
+    def place(name: str) -> str:
+        words = COUNTED_FROM_ZERO.get((effect, name))
+        return f" {words} x = {diagnosis.zero_m:.4g} m" if words and (diagnosis.zero_m or effect == "end_stop") else ""
+
+    return ", ".join(f"{name} = {_value(value, unit)}{place(name)}" for name, value in values.items())
 
 
 def _value(value: Value, unit: str) -> str:

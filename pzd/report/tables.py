@@ -27,6 +27,7 @@ from pzd.damper.effect import Effect
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.report.columns import TERMINAL, Beyond, Cell, Column, Difference, Quantity, Span, Table
+from pzd.report.diagnosis_text import COUNTED_FROM_ZERO
 
 FOLD = 12
 """Longer tables of tests and conditions are folded on the page."""
@@ -329,8 +330,9 @@ def effect_parameters(diagnosis: Diagnosis, control: Control) -> Table:
 
 def _counted_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
     """Return the name of a parameter, with the displacement from which it is counted where it is a place."""
-    is_place = (effect, name) == ("end_stop", "x_e")
-    return f"{name} to either side of x = {1000.0 * diagnosis.zero_m:.3g} mm" if is_place else name
+    words = COUNTED_FROM_ZERO.get((effect, name))
+    shown = words and (diagnosis.zero_m or effect == "end_stop")
+    return f"{name} {words} x = {1000.0 * diagnosis.zero_m:.3g} mm" if shown else name
 
 
 def peers(found: PeerComparison, control: Control) -> Iterator[Table]:

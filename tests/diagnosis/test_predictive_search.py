@@ -13,6 +13,8 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import cross_validation_of
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, Tried, _Proposal, as_good, loses_between
 from pzd.fit.cross_validation import PredictionError
+from pzd.quantities import Control
+from pzd.report.diagnosis_text import diagnosis_lines
 
 ENERGY = 1e4
 """Sum of squared forces of a test [N^2]."""
@@ -112,5 +114,8 @@ def test_damping_along_the_stroke_predicts_kept_back_tests_though_six_evaluation
     found = diagnosed(sines(truth, rng, (0.0,), tests=tests, noise=3e-3, cycles=5, jitter=0.003))
     assert (found.diagnosis.verdict, found.diagnosis.effects) == ("unexplained", ("position_damping",))
     assert found.damper.effects["position_damping"] == pytest.approx(zone, rel=0.05)
+    moved = found.diagnosis.model_copy(update={"zero_m": 0.002})
+    told = next(line for line in diagnosis_lines(moved, Control()) if line.startswith("adopted: position_damping"))
+    assert " m counted from x = 0.002 m" in told
     assert found.diagnosis.prediction is not None
     assert found.diagnosis.prediction.W_s < 0.05 * found.diagnosis.prediction.W_s_plain
