@@ -229,6 +229,13 @@ FEWEST_FOR_A_TREND = 3
 
 Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
 
+# --- The knee law or effects beside T0, C and k (workflow.py)
+
+BETTER_THAN_KNEE = 0.5
+"""Ratio of W_s of kept-back tests below which a damper with effects is handed on in the place of the knee law.
+
+Reason: the knee law leaves out one test at a time, effects whole folds; twice is beyond that. Not tuned."""
+
 # --- Zeros of the load cell that differ from test to test (workflow.py)
 
 LARGEST_ZERO = 0.03

@@ -84,8 +84,37 @@ def diagnose_setting(
     jobs: int,
 ) -> Diagnosed:
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
-    if identified.knees.law_of(setting) == "knee":
-        return knee_verdict(identified, setting, diagnose)
+
+    def beside_bingham() -> Diagnosed:
+        return _beside_bingham(diagnose, identify, stand, rig, identified, control, setting, jobs)
+
+    if identified.knees.law_of(setting) != "knee":
+        return beside_bingham()
+    found = knee_verdict(identified, setting, diagnose)
+    law = next(row for row in identified.knees.laws if row.setting == setting)
+    if found.diagnosis.verdict == "none" or identify.law != "auto" or law.W_s_knee is None:
+        return found
+    # Beside T0, C and k effects are looked for, and what the knee misses may be one of them.
+    other = beside_bingham()
+    predicted = other.diagnosis.prediction
+    if predicted is None or predicted.hold_out != "tests" or predicted.W_s > thresholds.BETTER_THAN_KNEE * law.W_s_knee:
+        return found
+    words = f"; the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
+    reason = f"{other.diagnosis.reason}{words}, this damper with {predicted.W_s:.3g}: it is handed on"
+    return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
+
+
+def _beside_bingham(
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    stand: RigConfig,
+    rig: Rig,
+    identified: Identified,
+    control: Control,
+    setting: str | None,
+    jobs: int,
+) -> Diagnosed:
+    """Diagnose one setting beside T0, C and k."""
     records, saturated = data.unsaturated_records(rig, setting)
     records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
@@ -104,14 +133,9 @@ def diagnose_setting(
         return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
     judged = _judged(campaign, baseline, diagnose, control.unit)
     judged = _with_zeros_of_tests(judged, baseline, diagnose, control.unit)
-    alone = [effect.name for effect in library().values() if effect.named_alone]
-    judged = _with_one_alone(judged, alone, baseline, diagnose, control.unit)
+    judged = _with_one_alone(judged, baseline, diagnose, control.unit)
     campaign, validation = judged.campaign, judged.validation
-    adoption, decision = conclude(judged.conclusion, validation, diagnose)
-    if decision.verdict == "unexplained" and len(found := adoption.selection.adopted) == 1 and found[0] in nameable():
-        again = _with_one_alone(judged, found, baseline, diagnose, control.unit)
-        if again is not judged:
-            adoption, decision = conclude(again.conclusion, validation, diagnose)
+    adoption, decision = _concluded(judged, baseline, diagnose, control.unit)
     support = support_of(adoption, validation)
     decision = with_parts_told(decision, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
@@ -210,17 +234,68 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
     return replace(again, zeros=told)
 
 
-ALONE = "alone it leaves nothing, and nothing else explains the tests"
+ALONE = "nothing is left with it, and nothing else explains the tests"
+MOST_ALONE = 2
+"""Effects that were added for what they predict, up to which they are judged again by themselves.
+
+Reason: three of them follow nearly anything."""
 
 
-def _with_one_alone(
-    first: _Judged, names: Sequence[str], baseline: Damper, config: DiagnoseConfig, unit: str
-) -> _Judged:
-    """Judge again with one of some effects where what is missing has no name, if alone it leaves nothing.
+def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+    """Judge again with an effect that is named where alone it leaves nothing, if what is missing has no other name.
 
-    A law may take part of much that is missing, but the whole of little: what it closes in every test, with values
-    that the tests determine, and predicts in those kept back, is what the damper does. Another one of them that closes
-    it as well is its rival.
+    Such a law may take part of much that is missing, but the whole of little. Another one of them that leaves nothing
+    as well is its rival.
+    """
+    adoption, decision = first.conclusion
+    if decision.verdict != "unexplained" or config.force:
+        return first
+    evidence, plain = adoption.selection.initial_evidence, adoption.selection.baseline
+    whole = evidence.whole
+    wanted = [effect for effect in library().values() if effect.named_alone and effect.name not in config.forbid]
+    tried = [converged(whole, plain, candidate(whole, plain, effect)) for effect in wanted]
+    closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
+    for each in sorted(closing, key=lambda c: c.delta_bic):
+        again = _judged_with(first, (each.effect,), baseline, config, unit)
+        if again is None:
+            continue
+        alike = [c.effect for c in closing if c is not each and c.delta_bic - each.delta_bic < config.rival_bic]
+        adoption, decision = again
+        if alike:
+            words = f"{decision.reason}; {' and '.join(alike)} would do as well on these tests"
+            possible = (*decision.possible, *alike)
+            decision = replace(decision, verdict="ambiguous", reason=words, possible=possible)
+        return replace(first, conclusion=(adoption, decision))
+    return first
+
+
+def _concluded(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> Conclusion:
+    """Conclude; and where what was added for its prediction leaves nothing, judge it by itself.
+
+    It came in as what predicts, beside whatever stood there first; without that it may be all that is missing.
+    """
+    adoption, decision = concluded = conclude(first.conclusion, first.validation, config)
+    selection, named = adoption.selection, nameable()
+    names = selection.adopted
+    if (
+        decision.verdict == "unexplained"
+        and 0 < len(names) <= MOST_ALONE
+        and not config.force
+        and all(name in named or library()[name].named_alone for name in names)
+        and not selection.initial_evidence.gap_is_significant(selection.fitted, config)
+    ):
+        again = _judged_with(first, names, baseline, config, unit)
+        if again is not None:
+            return conclude(again, first.validation, config)
+    return concluded
+
+
+def _judged_with(
+    first: _Judged, names: tuple[str, ...], baseline: Damper, config: DiagnoseConfig, unit: str
+) -> Conclusion | None:
+    """Judge some effects by themselves.
+
+    They close the gap in every test, with values that the tests determine, and predict those kept back, or are none.
 
     Parameters
     ----------
@@ -229,32 +304,23 @@ def _with_one_alone(
     baseline : damper without effects
     config : thresholds, forced and forbidden effects
     unit : of the control signal, for the reason
+
+    Returns
+    -------
+    what is adopted, and the verdict on it; None where these do not explain the tests
     """
-    adoption, decision = first.conclusion
-    selection, evidence = adoption.selection, adoption.selection.initial_evidence
-    if decision.verdict != "unexplained" or config.force:
-        return first
-    whole, plain = evidence.whole, selection.baseline
-    wanted = [library()[name] for name in names if name not in config.forbid]
-    tried = [converged(whole, plain, candidate(whole, plain, effect)) for effect in wanted]
-    closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
-    for each in sorted(closing, key=lambda c: c.delta_bic):
-        only = config.model_copy(update={"force": (each.effect,), "most_effects": 1})
-        selected = select_effects(first.campaign, baseline, only, first.campaign.jobs, forced_because=ALONE)
-        again, found = judge(selected, first.validation, only, unit)
-        kept = again.selection
-        if (
-            found.verdict in ("named", "ambiguous")
-            and kept.adopted == (each.effect,)
-            and improves(again.error, again.baseline_error, first.validation)
-            and not first_undetermined(kept.final_evidence.whole, kept.fitted, ())
-        ):
-            alike = [c.effect for c in closing if c is not each and c.delta_bic - each.delta_bic < config.rival_bic]
-            if alike:
-                words = f"{found.reason}; {' and '.join(alike)} would do as well on these tests"
-                found = replace(found, verdict="ambiguous", reason=words, possible=(*found.possible, *alike))
-            return replace(first, conclusion=(again, found))
-    return first
+    only = config.model_copy(update={"force": names, "most_effects": len(names)})
+    selected = select_effects(first.campaign, baseline, only, first.campaign.jobs, forced_because=ALONE)
+    adoption, decision = judge(selected, first.validation, only, unit)
+    kept = adoption.selection
+    explained = decision.verdict in ("named", "ambiguous") and {*kept.adopted} == {*names}
+    if (
+        explained
+        and improves(adoption.error, adoption.baseline_error, first.validation)
+        and not first_undetermined(kept.final_evidence.whole, kept.fitted, ())
+    ):
+        return adoption, decision
+    return None
 
 
 def fitted_to_all(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Selection:

@@ -193,6 +193,17 @@ def test_a_branch_is_named_where_alone_it_leaves_nothing(name: str, rng: np.rand
     assert found.damper.effects[name] == pytest.approx(BESIDE[name], rel=0.05)
 
 
+@pytest.mark.ci
+def test_a_branch_beside_a_valve_is_named_where_the_two_leave_nothing(rng: np.random.Generator) -> None:
+    """The valve alone closes a thirtieth of the gap, and the branch comes in as what predicts."""
+    effects = {"relief_valve": {"F_r": 400.0, "C_r": 300.0}, "second_branch": {"T0_2": 60.0, "k_2": 3e4}}
+    row = BaseRow(voltage_V=0.0, T0_N=60.0, C_Ns_per_m=1200.0, k_N_per_m=8e5)
+    tests = ((0.5, 0.02), (1.0, 0.02), (2.0, 0.02), (3.0, 0.02), (5.0, 0.012))
+    records = sines(Damper(base=(row,), effects=effects), rng, (0.0,), tests=tests, noise=3e-3, colour=0.0)
+    told = diagnosed(records).diagnosis
+    assert (told.verdict, {*told.effects}) == ("named", {*effects}), told.reason
+
+
 def dahl(record: Record, force: float, stiffness: float) -> Array:
     """Friction of Dahl along a displacement: dF/dx = s (1 - F/F_0 sign(dx)), as no law of the library."""
     finer, found, at = 40, np.zeros(record.time.size), 0.0

@@ -26,6 +26,7 @@ from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.stage import diagnose
 from pzd.diagnosis.verdict import knee_verdict
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.knee import TRADE_SPEEDS, HeldOutLaws, force_changes, identify_knees, law_row
@@ -33,6 +34,7 @@ from pzd.identification.stage import identify
 from pzd.parallel.processes import no_listener
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.rig.config import FilesEntry, RigConfig
 from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -101,6 +103,32 @@ def with_a_knee(tests_of_a_knee: Rig) -> Identified:
 @pytest.fixture(scope="module")
 def with_round_knees(generator_for: Callable[[str], np.random.Generator]) -> Identified:
     return found(round_knees, generator_for("a damper with round knees"))
+
+
+@pytest.mark.ci
+def test_effects_beside_t0_and_c_take_the_place_of_a_knee_law_that_predicts_far_worse(
+    rng: np.random.Generator,
+) -> None:
+    """The knee law has rebound unlike compression and a valve, and no hysteresis."""
+    effects = {
+        "asymmetry": {"alpha": 0.3},
+        "relief_valve": {"F_r": 350.0, "C_r": 300.0},
+        "second_branch": {"T0_2": 30.0, "k_2": 3e4},
+    }
+    row = BaseRow(T0_N=60.0, C_Ns_per_m=1200.0, k_N_per_m=8e5)
+    records, config = rig(of(Damper(base=(row,), effects=effects)), rng), IdentifyConfig(law="auto")
+    identified = identify(config, records, 1)
+    (law,) = identified.knees.laws
+    assert law.law == "knee"
+    stand = RigConfig(files=(FilesEntry(path="*.csv"),))
+    told = diagnose(DiagnoseConfig(), config, stand, records, identified, Control(), None, 1)
+    assert "knee" not in told.damper.effects
+    assert told.diagnosis.prediction is not None
+    assert law.W_s_knee is not None
+    assert told.diagnosis.prediction.W_s < 0.1 * law.W_s_knee
+    assert "the knee law, which identify.law: auto took, predicts kept-back tests with W_s" in told.diagnosis.reason
+    kept = diagnose(DiagnoseConfig(), IdentifyConfig(law="knee"), stand, records, identified, Control(), None, 1)
+    assert "knee" in kept.damper.effects  # the config asks for it
 
 
 def test_bleed_knee_and_blow_off_of_each_direction_lie_in_their_intervals(with_a_knee: Identified) -> None:
