@@ -229,6 +229,13 @@ FEWEST_FOR_A_TREND = 3
 
 Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
 
+# --- What is judged by itself (workflow.py)
+
+ALONE_LEAVES = 0.25
+"""Ratio of W_s of kept-back tests, to the baseline, above which a law that takes part of much is not named alone.
+
+Reason: half of the force error; a mount that sticks and slips, which is no branch, leaves more of it."""
+
 # --- The knee law or effects beside T0, C and k (workflow.py)
 
 BETTER_THAN_KNEE = 0.5

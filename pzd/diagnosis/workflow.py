@@ -314,6 +314,10 @@ def _judged_with(
     adoption, decision = judge(selected, first.validation, only, unit)
     kept = adoption.selection
     explained = decision.verdict in ("named", "ambiguous") and {*kept.adopted} == {*names}
+    before, after = adoption.baseline_error.criterion, adoption.error.criterion
+    imitates = any(library()[name].named_alone for name in names)
+    if before is None or after is None or (imitates and after > thresholds.ALONE_LEAVES * before):
+        return None
     if (
         explained
         and improves(adoption.error, adoption.baseline_error, first.validation)
