@@ -223,7 +223,8 @@ class Effect:
     """Why no verdict names it beside others; a damper then has it only where held-out tests are predicted better with
     it, or where the config forces it. None for an effect that a verdict may name."""
     named_alone: bool = False
-    """Whether a verdict names it all the same, where nothing else explains the tests and alone it leaves nothing."""
+    """Whether a verdict names it all the same, where nothing else explains the tests and it leaves nothing, alone or
+    beside one other."""
     imitates: bool = False
     """Whether its numbers let it follow a part of nearly any difference of two forces: `pzd changes` asks it last."""
     asked_last: bool = False

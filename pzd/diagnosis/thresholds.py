@@ -231,6 +231,10 @@ Reason: with fewer a single odd test makes any trend; at three Student's t still
 
 # --- What is judged by itself (workflow.py)
 
+MOST_ALONE = 2
+"""Effects that were added for what they predict, up to which they are judged again by themselves.
+
+Reason: three of them follow nearly anything."""
 ALONE_LEAVES = 0.25
 """Ratio of W_s of kept-back tests, to the baseline, above which a law that takes part of much is not named alone.
 

@@ -21,6 +21,7 @@ from pzd.artefacts import (
     Value,
     base_of,
 )
+from pzd.artefacts.knee import Knees, LawRow
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper
@@ -84,37 +85,14 @@ def diagnose_setting(
     jobs: int,
 ) -> Diagnosed:
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
-
-    def beside_bingham() -> Diagnosed:
-        return _beside_bingham(diagnose, identify, stand, rig, identified, control, setting, jobs)
-
-    if identified.knees.law_of(setting) != "knee":
-        return beside_bingham()
-    found = knee_verdict(identified, setting, diagnose)
-    law = next(row for row in identified.knees.laws if row.setting == setting)
-    if found.diagnosis.verdict == "none" or identify.law != "auto" or law.W_s_knee is None:
-        return found
-    # Beside T0, C and k effects are looked for, and what the knee misses may be one of them.
-    other = beside_bingham()
-    predicted = other.diagnosis.prediction
-    if predicted is None or predicted.hold_out != "tests" or predicted.W_s > thresholds.BETTER_THAN_KNEE * law.W_s_knee:
-        return found
-    words = f"; the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
-    reason = f"{other.diagnosis.reason}{words}, this damper with {predicted.W_s:.3g}: it is handed on"
-    return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
-
-
-def _beside_bingham(
-    diagnose: DiagnoseConfig,
-    identify: IdentifyConfig,
-    stand: RigConfig,
-    rig: Rig,
-    identified: Identified,
-    control: Control,
-    setting: str | None,
-    jobs: int,
-) -> Diagnosed:
-    """Diagnose one setting beside T0, C and k."""
+    if identified.knees.law_of(setting) == "knee":
+        found = knee_verdict(identified, setting, diagnose)
+        if found.diagnosis.verdict == "none" or identify.law != "auto":
+            return found
+        # Beside T0, C and k effects are looked for, and what the knee misses may be one of them.
+        bingham = replace(identified, knees=Knees())
+        other = diagnose_setting(diagnose, identify, stand, rig, bingham, control, setting, jobs)
+        return _better_predicting(found, other, next(row for row in identified.knees.laws if row.setting == setting))
     records, saturated = data.unsaturated_records(rig, setting)
     records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
@@ -170,6 +148,24 @@ def _beside_bingham(
         rows = base_parameters(handed_on, decision.verdict, setting)
     shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
     return Diagnosed(diagnosis, final, baseline, rows, shapes)
+
+
+def _better_predicting(knee: Diagnosed, other: Diagnosed, law: LawRow) -> Diagnosed:
+    """Return the damper with the knee law, or the one beside T0, C and k where it predicts kept-back tests far better.
+
+    Parameters
+    ----------
+    knee, other : the two dampers
+    law : of the setting, with what the knee law predicts
+    """
+    found = other.diagnosis.prediction
+    if law.W_s_knee is None or found is None or found.hold_out != "tests":
+        return knee
+    if found.W_s > thresholds.BETTER_THAN_KNEE * law.W_s_knee:
+        return knee
+    words = f"the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
+    reason = f"{other.diagnosis.reason}; {words}, this damper with {found.W_s:.3g}: it is handed on"
+    return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
 
 
 def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:
@@ -235,10 +231,6 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
 
 
 ALONE = "nothing is left with it, and nothing else explains the tests"
-MOST_ALONE = 2
-"""Effects that were added for what they predict, up to which they are judged again by themselves.
-
-Reason: three of them follow nearly anything."""
 
 
 def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
@@ -279,7 +271,7 @@ def _concluded(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     names = selection.adopted
     if (
         decision.verdict == "unexplained"
-        and 0 < len(names) <= MOST_ALONE
+        and 0 < len(names) <= thresholds.MOST_ALONE
         and not config.force
         and all(name in named or library()[name].named_alone for name in names)
         and not selection.initial_evidence.gap_is_significant(selection.fitted, config)
@@ -293,9 +285,7 @@ def _concluded(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
 def _judged_with(
     first: _Judged, names: tuple[str, ...], baseline: Damper, config: DiagnoseConfig, unit: str
 ) -> Conclusion | None:
-    """Judge some effects by themselves.
-
-    They close the gap in every test, with values that the tests determine, and predict those kept back, or are none.
+    """Judge some effects by themselves: they leave nothing, the tests determine them, and they predict those kept back.
 
     Parameters
     ----------
@@ -313,18 +303,14 @@ def _judged_with(
     selected = select_effects(first.campaign, baseline, only, first.campaign.jobs, forced_because=ALONE)
     adoption, decision = judge(selected, first.validation, only, unit)
     kept = adoption.selection
-    explained = decision.verdict in ("named", "ambiguous") and {*kept.adopted} == {*names}
     before, after = adoption.baseline_error.criterion, adoption.error.criterion
-    imitates = any(library()[name].named_alone for name in names)
-    if before is None or after is None or (imitates and after > thresholds.ALONE_LEAVES * before):
+    if decision.verdict == "unexplained" or {*kept.adopted} != {*names} or before is None or after is None:
         return None
-    if (
-        explained
-        and improves(adoption.error, adoption.baseline_error, first.validation)
-        and not first_undetermined(kept.final_evidence.whole, kept.fitted, ())
-    ):
-        return adoption, decision
-    return None
+    if any(library()[name].named_alone for name in names) and after > thresholds.ALONE_LEAVES * before:
+        return None
+    determined = first_undetermined(kept.final_evidence.whole, kept.fitted, ()) is None
+    predicts = improves(adoption.error, adoption.baseline_error, first.validation)
+    return (adoption, decision) if determined and predicts else None
 
 
 def fitted_to_all(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Selection:

@@ -232,10 +232,8 @@ STEP_OF_MISFIT = 1.0
 """Misfit [squares of noise] that another oil spring must gain for the search to go on from there.
 
 Reason: less tells no two springs apart."""
-
-
 AS_NOISE = 2.0
-"""Misfit a residual up to which a row is taken beyond steps.
+"""Misfit per residual up to which another oil spring is tried.
 
 Reason: where a law is missing all misfits are larger, and a step of them is no flank; not tuned."""
 

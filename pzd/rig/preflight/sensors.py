@@ -241,7 +241,7 @@ def gain_step(test: PreflightRecord) -> Iterator[Finding]:
 def fade(test: PreflightRecord) -> Iterator[Finding]:
     """Find a force that grows or falls from cycle to cycle by a factor, the motion being the same.
 
-    Equation: log of the force's r.m.s. of a cycle = a + b n + c n^2, by c where it is clear     Source: least squares
+    Equation: log of the force's r.m.s. of a cycle = a + b n + c n^2                    Source: least squares
     """
     run, course = test.cycles, _sizes_by_cycle(test)
     if run is None or course is None or any(gain_step(test)):
