@@ -47,7 +47,7 @@ FETCHES = {"src", "href", "srcset", "data", "action", "poster"}
 class Reader(HTMLParser):
     """Tags with their attributes, the text, and whether every tag is closed."""
 
-    EMPTY = frozenset({"meta", "link", "img", "br", "input"})
+    EMPTY = frozenset({"meta", "link", "img", "br", "wbr", "input"})
 
     def __init__(self, page: str) -> None:
         super().__init__()
