@@ -409,6 +409,30 @@ def descend(objective: Objective, start: Bingham, known: float | None = None, fr
     return _settled(objective, x, Fit(objective.from_search(x), at(found.x)[0], objective))
 
 
+STEP_SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Parts of a Gauss-Newton step that are tried.
+
+Reason: of a criterion without steps the first of them takes nearly all that there is to gain; not tuned."""
+
+
+MUCH_OF_AN_ERROR = 0.1
+"""Part of a standard error by which an optimum between steps may be missed, r.m.s. over T0, C and k."""
+
+
+def ends_at_a_step(objective: Objective, parameters: Bingham) -> bool:
+    """Tell whether the criterion hardly falls along the Gauss-Newton step from parameters, whatever its slope.
+
+    Equation: W_s (1 - p e^2 / N) at the least, p = 3 parameters, N samples, e = `MUCH_OF_AN_ERROR`
+    """
+    x, high = objective.to_search(parameters), objective.coordinates.high
+    triangle = objective.triangle(parameters, objective.coordinates.slopes(x))
+    here = float(triangle[:, 3] @ triangle[:, 3]) / objective.energy
+    step = np.linalg.lstsq(triangle[:, :3], triangle[:, 3], rcond=1e-12)[0]
+    trials = (np.clip(x + share * step, 0.0, high) for share in STEP_SHARES)
+    lowest = min(_fit_at(objective, objective.from_search(trial)).criterion for trial in trials)
+    return lowest > here * (1.0 - 3.0 * MUCH_OF_AN_ERROR**2 / objective.measured.size)
+
+
 def _settled(objective: Objective, x: Array, found: Fit) -> Fit:
     """Return the optimum in the limits of the law that it came next to, unless the criterion is less beside them."""
     limit = np.where(x < AT_LIMIT, 0.0, x)

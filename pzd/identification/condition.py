@@ -230,7 +230,8 @@ def estimate_of(
     for i, (labels, parameters) in enumerate(optimum):
         here = touched[:, i] if touched is not None and np.any(touched[:, i]) else slice(None)
         measured, missed = objective.measured[here], misses(residuals[here], objective.measured[here])
-        reserved = trust.reservations(objective, parameters, missed[0], cosines[i], misfit, stiffest)
+        unsettled = trust.not_converged(objective, parameters, cosines[i], whole=touched is None)
+        reserved = trust.reservations(objective, parameters, missed[0], unsettled, misfit, stiffest)
         rows.append(FittedRow(labels, parameters, noise[i], float(measured @ measured), reserved, missed, stiffest))
     sources, nuisances = variance_sources(records, misfit), nuisance_equations_of(records)
     return Estimate(tuple(rows), sources, nuisances, gram, rms(objective.measured), objective.scales[1])

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.parallel.on_disk import beside, one_at_a_time
-from pzd.record import Array, Record
+from pzd.record import Array, Mask, Record
 from pzd.signals.cycles import Cycles, cycles_of
-from pzd.signals.jumps import jumps, jumps_in_cycles, unresolved_flanks
-from pzd.signals.kinematics import clean_displacement_of
+from pzd.signals.jumps import hidden_direction, jumps, jumps_in_cycles, unresolved_flanks
+from pzd.signals.kinematics import clean_displacement_of, displacement_error_of
 from pzd.signals.measures import REVERSAL_SHARE, reversals
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 from pzd.signals.period import moving_range
@@ -53,7 +53,7 @@ class PreparedRecord:
     counted: NDArray[np.bool_]
     """(n,) whether the sample enters the criterion."""
     weight: Array
-    """(n,) 1, and 0 at a sample that a jump of the force passes by chance on one side or the other."""
+    """(n,) 1, and 0 at a sample beside a reversal where it is chance whether the friction has turned."""
     positions: Array | None = None
     """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""
 
@@ -93,12 +93,15 @@ def prepare(record: Record) -> PreparedRecord:
         factor,
         record.force,
         in_motion(record),
-        beside(
-            np.where(unresolved_flanks(record.force, reversals(record.displacement), record.rate), 0.0, 1.0),
-            record.force,
-        ),
+        beside(np.where(_turned_by_chance(record), 0.0, 1.0), record.force),
         positions,
     )
+
+
+def _turned_by_chance(record: Record) -> Mask:
+    """Find the samples (n,) at which noise or sampling leave to chance whether the friction has turned."""
+    flanks = unresolved_flanks(record.force, reversals(record.displacement), record.rate)
+    return flanks | hidden_direction(clean_displacement_of(record), displacement_error_of(record))
 
 
 def _on_fine_grid(displacement: Array, record: Record, time: Array, *, even: bool) -> Array:

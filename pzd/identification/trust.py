@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective
+from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective, ends_at_a_step
 from pzd.identification.prepared_record import FittedRecord
 from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import Array
@@ -149,7 +149,7 @@ def reservations(
     objective: Objective,
     parameters: Bingham,
     criterion: float,
-    cosines: Array,
+    unsettled: Sequence[bool],
     misfit: Misfit,
     stiffest: float | None = None,
 ) -> tuple[Reservation, ...]:
@@ -160,11 +160,10 @@ def reservations(
     objective : the data
     parameters : the optimum
     criterion : W_s there
-    cosines : (3,) of stationarity
+    unsettled : of each whether the criterion still falls along it
     misfit : of the model
     stiffest : stiffness from which on the tests do not tell k from infinity [N/m]; None where it was not looked for
     """
-    unsettled = _not_converged(objective, parameters, cosines.tolist())
     vetoes = [
         f"at a bound of the search{_tare_hint(objective)}"
         if bounded
@@ -273,10 +272,22 @@ def _doubt(left: float, misfit: Misfit) -> str | None:
     return "; ".join(reasons) or None
 
 
-def _not_converged(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:
-    """Tell for each parameter whether the criterion still falls along it; at a limit of the law it may."""
+def not_converged(objective: Objective, parameters: Bingham, cosines: Array, *, whole: bool) -> list[bool]:
+    """Tell for each parameter whether the criterion still falls along it; at a limit of the law it may.
+
+    Where a friction turns within few samples, the criterion over k has a step wherever one more sample changes sides.
+    At the edge of a step no slope is zero, and that is the optimum if the criterion falls no further.
+
+    Parameters
+    ----------
+    objective : the data
+    parameters : the optimum
+    cosines : (3,) of `stationarity`
+    whole : whether T0, C and k are all that was fitted to these data
+    """
     x = objective.coordinates.to_search(*parameters)
-    return [c > CONVERGENCE_COSINE and at > AT_LIMIT for c, at in zip(cosines, x.tolist(), strict=True)]
+    moving = [c > CONVERGENCE_COSINE and at > AT_LIMIT for c, at in zip(cosines.tolist(), x.tolist(), strict=True)]
+    return moving if any(moving) and not (whole and ends_at_a_step(objective, parameters)) else [False] * len(moving)
 
 
 def _tare_hint(objective: Objective) -> str:

@@ -6,7 +6,7 @@ chance. Where samples are left out, nothing is differenced across the gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -140,13 +140,7 @@ def beside_unresolved_reversals(displacement: Array, travel: float, *, closed: b
     found, x = np.zeros(size, dtype=np.bool_), displacement
     if closed:
         x = np.concatenate([x, x, x])
-    for turn in reversals(x, SMALL_STROKE):
-        if not 2 <= turn < x.size - 2:
-            continue
-        before, at, after = (float(x[turn + i]) for i in (-1, 0, 1))
-        bend = before - 2.0 * at + after
-        vertex = turn + float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend else float(turn)
-        top = at - 0.125 * (before - after) ** 2 / bend if bend else at
+    for vertex, top in _vertices(x, SMALL_STROKE):
         ahead = int(np.floor(vertex)) + 1
         share = vertex + 1.0 - ahead
         gone = abs((1.0 - share) * float(x[ahead]) + share * float(x[ahead + 1]) - top)
@@ -154,6 +148,62 @@ def beside_unresolved_reversals(displacement: Array, travel: float, *, closed: b
             beside = np.arange(int(np.ceil(vertex - 1.0)), int(np.floor(vertex + 1.0)) + 1)
             found[beside % size if closed else beside] = True
     return found
+
+
+def _vertices(x: Array, share: float) -> Iterator[tuple[float, float]]:
+    """Yield where a motion (n,) reverses, between strokes of a share of its range: by the parabola through samples."""
+    for turn in reversals(x, share):
+        if 2 <= turn < x.size - 2:
+            before, at, after = (float(x[turn + i]) for i in (-1, 0, 1))
+            bend = before - 2.0 * at + after
+            vertex = turn + float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend else float(turn)
+            yield vertex, at - 0.125 * (before - after) ** 2 / bend if bend else at
+
+
+NOISE_TO_TURN = 4.0
+"""Way from a reversal, in the noise that is left in the motion, within which the samples do not tell its direction.
+
+Reason: that noise is told up to two times too small (`displacement_error_of`); two of its standard deviations."""
+
+
+def hidden_direction(displacement: Array, noise: float, *, closed: bool = False) -> Mask:
+    """Find the samples at which noise of the displacement hides which way the rod goes.
+
+    These are near a reversal, and wherever the rod seems to go back by less than noise can do. A friction there pushes
+    either way. Behind an oil spring that gives by more it hardly matters: the force of so short a way is small.
+
+    Parameters
+    ----------
+    displacement : (n,) cleaned [m]
+    noise : r.m.s. that is left in it [m]
+    closed : whether the last sample is followed by the first
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 0.9, 2.0, 2.8, 3.0, 2.8, 2.0, 1.0, 0.0])
+    >>> np.flatnonzero(hidden_direction(x, 0.1)).tolist()
+    [2, 4, 5, 6]
+    """
+    size, within = displacement.size, NOISE_TO_TURN * noise
+    found, x = np.zeros(size, dtype=np.bool_), displacement
+    if closed:
+        x = np.concatenate([x, x, x])
+    travel = float(np.ptp(displacement))
+    if not 0.0 < within < travel:
+        return found
+    share = max(SMALL_STROKE, within / travel)
+    hidden = np.zeros(x.size, dtype=np.bool_)
+    for vertex, top in _vertices(x, share):
+        turn = round(vertex)
+        far = np.abs(x - top) >= within
+        low = turn - int(np.argmax(np.append(far[turn::-1], True)))
+        high = turn + int(np.argmax(np.append(far[turn:], True)))
+        if high - low > 2:  # a sample at the vertex alone is hidden by no noise
+            hidden[low + 1 : high] = True
+    for stroke in np.split(np.arange(x.size), reversals(x, share)):
+        forward = np.sign(x[stroke[-1]] - x[stroke[0]]) * x[stroke]
+        hidden[stroke] |= forward < np.maximum.accumulate(forward)
+    return np.asarray(hidden[size : 2 * size] if closed else hidden)
 
 
 def jump_timing_error(measured: Array, predicted: Array, *, closed: bool = False) -> Array:

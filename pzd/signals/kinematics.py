@@ -10,6 +10,7 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.random import default_rng
 
 from pzd.parallel.on_disk import beside
 from pzd.record import Array, Record
@@ -70,6 +71,21 @@ def clean_displacement_of(record: Record) -> Array:
         found = kinematics(record.time, record.displacement, cycles_of(record)).displacement
         remember_clean_displacement(record, found)
     return _clean_by_record[record]
+
+
+def displacement_error_of(record: Record) -> float:
+    """Estimate the r.m.s. noise that is left in the clean displacement of a record [m].
+
+    Equation: s = |S e| / sqrt(n), S the cleaning, e what it took away in random order
+                                                    Source: Girard 1989, Numer. Math. 56, 1 (trace of S S' by a draw)
+
+    What the cleaning takes from the motion itself is not in it: with that the error is 0.9 to 2 times as much, in the
+    mean 1.2 times (110 tests of `tests/studies/plain_study.py`).
+    """
+    clean = clean_displacement_of(record)
+    taken = default_rng(0).permutation(record.displacement - clean)
+    changed = kinematics(record.time, clean + taken, cycles_of(record)).displacement
+    return float(np.std(changed - clean))
 
 
 def remember_clean_displacement(record: Record, clean: Array) -> None:

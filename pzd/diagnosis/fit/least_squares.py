@@ -290,11 +290,25 @@ def _prior(problem: Problem, effects: int) -> Array:
     return np.eye(3 * rows + effects)[columns] / PRIOR_DEVIATION
 
 
+LARGEST_LAG = 0.2
+"""C/k up to which oil springs are searched whatever they begin at, as a share of stroke over peak speed.
+
+Reason: a fit without the branch of a seal gives its friction, which turns at once, a rigid spring, whatever that of the
+oil is; beyond this the force of a sine falls by a fiftieth."""
+
+
+def _softest(problem: Problem) -> list[float]:
+    """Return the stiffness (b,) of each base row at `LARGEST_LAG` [N/m]."""
+    duration = problem.scales.stroke / (problem.scales.speed or 1.0)
+    return [max(row.C_Ns_per_m / (LARGEST_LAG * duration), 1.0) for row in problem.base]
+
+
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
     """Return the limits of the search: rows within a ratio of their start, beyond which dampers are rigid or dead."""
     start = problem.start().reshape(-1, 3)
     low, high = np.zeros_like(start), np.maximum(start, problem.unseen) + LARGEST_LOG_RATIO
     high = np.minimum(high, np.maximum(start, problem.coordinates.high))
+    high[:, 2] = np.maximum(high[:, 2], [problem.coordinates.to_search(0.0, 0.0, k)[2] for k in _softest(problem)])
     high[:, 0] = 2.0
     bounds = np.reshape([u.bounds for u in unknowns], (-1, 2))
     return np.concatenate([low.ravel(), bounds[:, 0]]), np.concatenate([high.ravel(), bounds[:, 1]])

@@ -67,16 +67,20 @@ def most_promising(
     """
     _ = before.column_basis  # needed by every effect: computed once, before they go to threads of their own
 
-    def promise(effect: Effect) -> Promise:
-        own, values = problem.with_friction_scaling(effect), (reached or {}).get(effect.name)
+    def promise(own: Problem, effect: Effect) -> Promise:
+        values = (reached or {}).get(effect.name)
         starts = starts_of(own, before, effect)
         starts = starts if values is None or values.size != starts[0].size else [values]
         found = [(_promised_misfit(own, before, effect, start), start) for start in starts]
         misfit, start = min(found, key=lambda each: each[0])
         return Promise(effect, own, start, misfit)
 
+    # What changes with the voltage as T0 does may as well be a seal, which knows no voltage.
+    asked = [
+        (own, effect) for effect in effects for own in dict.fromkeys((problem.with_friction_scaling(effect), problem))
+    ]
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        return sorted(pool.map(promise, effects), key=lambda each: each.misfit)
+        return sorted(pool.map(lambda each: promise(*each), asked), key=lambda each: each.misfit)
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
@@ -244,9 +248,12 @@ def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array 
         fitted = reached[-1].fitted
         if fitted.misfit <= before.misfit + thresholds.STUCK_MISFIT or _switched_off(effect, fitted):
             break
-    rigid = late_instead_of_elastic(problem, before, effect) if start is None else None
-    if rigid is not None:
-        reached.append(_fitted_from(problem, before, effect.name, rigid, thresholds.FIRST_EVALUATIONS))
+    others = [friction_beside_oil(problem, before, effect)]
+    if start is None:
+        others.append(late_instead_of_elastic(problem, before, effect))
+    for other in others:
+        if other is not None:
+            reached.append(_fitted_from(problem, before, effect.name, other, thresholds.FIRST_EVALUATIONS))
     return min(reached, key=lambda c: c.fitted.misfit)
 
 
@@ -266,6 +273,54 @@ def late_instead_of_elastic(problem: Problem, before: FitResult, effect: Effect)
     rows = _search_start(problem, before).copy()
     rows[2 : 3 * len(problem.base) : 3] = 0.0
     return np.append(rows, tau.to_search(lag))
+
+
+LAGS_TRIED = (0.01, 0.03, 0.1)
+"""C/k of the oil spring behind a branch that takes the friction over, as shares of stroke over speed.
+
+Reason: a fit gives a friction that turns at once a spring that is far too stiff, whatever that of the oil; each of
+these is within a factor of two of every lag between."""
+GIVES_TRIED = (1e-4, 1e-2)
+"""Way of that branch until it slips, as a share of the stroke: a seal that turns at once, and one that gives."""
+
+
+def friction_beside_oil(problem: Problem, before: FitResult, effect: Effect) -> Array | None:
+    """Return a start (3 b + e,) at which the branch takes over the friction that the element has at every voltage.
+
+    T0 acts through the oil spring, that of a seal beside it. A fit without the branch gives all of it to T0, and beside
+    that no small branch is better: the way over is barred.
+
+    Returns
+    -------
+    None where the effect is no branch that slips, or the element has no friction
+    """
+    friction = np.array([row.T0_N for row in before.damper.base])
+    if effect.name != "second_branch" or problem.rigid or min(friction) <= 0.0:
+        return None
+    unknowns = _new_unknowns(problem, before, effect)
+    rows, nodes = _search_start(problem, before), np.array(problem.nodes)
+    by_voltage = any(unknown.node is not None for unknown in unknowns)
+    taken = friction if by_voltage else np.full(friction.size, min(friction))
+
+    def start(lag: float, give: float) -> Array:
+        moved, own = rows.copy(), []
+        for i, row in enumerate(before.damper.base):
+            stiffness = row.k_N_per_m if lag == 0.0 else max(row.C_Ns_per_m / lag, 1.0)
+            left = problem.coordinates.to_search(row.T0_N - float(taken[i]), row.C_Ns_per_m, stiffness)
+            moved[3 * i : 3 * i + 3] = left
+        for unknown in unknowns:
+            force = float(np.mean(taken if unknown.node is None else taken[nodes == unknown.node]))
+            own.append(unknown.to_search(force if unknown.parameter.name == "T0_2" else force / give))
+        return np.append(moved, own)
+
+    limits = np.full(rows.size + len(unknowns), -np.inf), np.full(rows.size + len(unknowns), np.inf)
+    frictions = range(0, 3 * len(problem.base), 3)
+    every = problem.unknowns((*before.effects, effect.name))
+    stroke = problem.scales.stroke
+    duration = stroke / (problem.scales.speed or 1.0)
+    starts = [start(lag * duration, give * stroke) for lag in (0.0, *LAGS_TRIED) for give in GIVES_TRIED]
+    misfits = [float(np.sum(linearise(problem, every, each, limits, frictions).stacked ** 2)) for each in starts]
+    return starts[int(np.argmin(misfits))]
 
 
 def _switched_off(effect: Effect, fitted: FitResult) -> bool:
