@@ -199,7 +199,7 @@ class PredictiveSearch:
         while promises and (places := count - sum(self._moves_force(each) for each in found)):
             found += self._tried(problem, fitted, promises[:places])
             promises = promises[places:]
-        return found
+        return found + self._alike(problem, fitted, found)
 
     def _tried(self, problem: Problem, fitted: FitResult, promises: Sequence[Promise]) -> list[Candidate]:
         """Fit effects beside those of a fit, and remember the values that they reached.
@@ -212,6 +212,16 @@ class PredictiveSearch:
         self.reached.update((c.effect, c.fitted.optimum[fitted.optimum.size :]) for c in fits if self._moves_force(c))
         pairs = zip(fits, promises, strict=True)
         return [replace(each, varies=promise.problem is not problem) for each, promise in pairs]
+
+    def _alike(self, problem: Problem, fitted: FitResult, found: Sequence[Candidate]) -> list[Candidate]:
+        """Fit effects whose parameters follow T0 from voltage to voltage with one value at all, as a seal has."""
+
+        def alike(each: Candidate) -> Candidate:
+            own = each.fitted.optimum[fitted.optimum.size :].reshape(len(problem.voltages), -1)
+            return candidate(problem, fitted, library()[each.effect], own.mean(axis=0))
+
+        varying = [each for each in found if each.varies and self._moves_force(each)]
+        return list(self.validation.campaign.parallel_map(alike, varying))
 
     def _moves_force(self, found: Candidate) -> bool:
         return found.explained >= self.config.visible

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.confounders import known
-from pzd.damper.model import Damper, against_nature
+from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
 from pzd.diagnosis.campaign import Campaign, nearest_row
@@ -113,10 +113,7 @@ def conclude(judged: Conclusion, validation: CrossValidation, config: DiagnoseCo
 def _hints(adoption: Adoption, decision: Decision) -> Iterator[str]:
     """Yield what else may look like the adopted effects, and what would tell."""
     selection = adoption.selection
-    damper, told = selection.fitted.damper, {*selection.adopted, *selection.rivals, *decision.possible}
-    passive = all(row.voltage_V is None for row in damper.base)
-    if decision.verdict == "unexplained" and passive and "rounded_yield" in damper.effects:
-        yield "a valve with bleed and blow-off looks like a rounded yield: identify.law: auto tries the knee law"
+    told = {*selection.adopted, *selection.rivals, *decision.possible}
     if {"valve_lag", "piezo_hysteresis"} <= told:
         yield (
             "a control signal that moves at rates farther apart tells a lag, whose force grows with the rate, from a "
@@ -616,6 +613,21 @@ def alone_note(validation: CrossValidation) -> str:
     if not alone:
         return ""
     return f"; {counted(alone, 'test')} kept back left none at the same temperature, and were predicted from the others"
+
+
+def knee_note(law: str, verdict: str, base: Sequence[BaseRow]) -> str:
+    """Say that a passive damper may have another law, where the verdict is that something without a name is missing.
+
+    Parameters
+    ----------
+    law : `identify.law`
+    verdict : what is said of the damper, or of what changed in it
+    base : rows of the damper
+    """
+    passive = all(row.voltage_V is None for row in base)
+    if law != "bingham" or verdict != "unexplained" or not passive:
+        return ""
+    return "; a passive damper has bleed, knee and blow-off: identify: {law: auto} tries that law"
 
 
 def no_prediction_note(prediction: Prediction | None) -> str:

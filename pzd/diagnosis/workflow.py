@@ -54,6 +54,7 @@ from pzd.diagnosis.verdict import (
     insufficient_data,
     insufficient_data_diagnosis,
     judge,
+    knee_note,
     knee_verdict,
     no_prediction_note,
     no_slip_diagnosis,
@@ -126,11 +127,12 @@ def diagnose_setting(
         data.saturation_note(saturated),
         data.drift_note(drift),
     )
+    another_law = knee_note(identify.law, decision.verdict, baseline.base)
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason="".join((decision.reason, judged.zeros, campaign.budget.note, *limits, _hum(before))),
+        reason="".join((decision.reason, another_law, judged.zeros, campaign.budget.note, *limits, _hum(before))),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),

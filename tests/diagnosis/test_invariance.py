@@ -260,6 +260,8 @@ def test_a_stop_at_one_end_of_an_absolute_displacement_is_found_where_it_is(rng:
         (0.024, 0.008, None),
         (0.010, 0.0, "in the middle"),
         (0.014, 0.004, "in the middle"),
+        (0.0293, 0.0, "turn round"),
+        (0.0293, 0.002, None),
     ],
 )
 def test_an_end_stop_acts_near_an_end_of_a_recorded_stroke_of_60_mm(x_e: float, zero: float, why: str | None) -> None:

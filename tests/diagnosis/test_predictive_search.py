@@ -119,3 +119,26 @@ def test_damping_along_the_stroke_predicts_kept_back_tests_though_six_evaluation
     assert " m counted from x = 0.002 m" in told
     assert found.diagnosis.prediction is not None
     assert found.diagnosis.prediction.W_s < 0.05 * found.diagnosis.prediction.W_s_plain
+
+
+def test_the_friction_of_a_seal_is_told_from_that_of_the_valve_behind_the_oil(rng: np.random.Generator) -> None:
+    """A fit without the branch makes a rigid spring of it, or the lag of a recorder, and the oil is lost."""
+    row = BaseRow(voltage_V=0.0, T0_N=0.0, C_Ns_per_m=1500.0, k_N_per_m=8e5)
+    truth = Damper(base=(row,), effects={"second_branch": {"T0_2": 20.0, "k_2": 1e8}})
+    tests = ((1.0, 0.01), (1.0, 0.025), (2.5, 0.01), (2.5, 0.025), (4.8, 0.025))
+    found = diagnosed(sines(truth, rng, (0.0,), tests=tests, noise=4e-3, cycles=5, jitter=0.003))
+    assert found.diagnosis.effects == ("second_branch",)
+    assert found.damper.effects["second_branch"]["T0_2"] == pytest.approx(20.0, rel=0.1)
+    (base,) = found.damper.base
+    assert base.k_N_per_m == pytest.approx(8e5, rel=0.2)  # a millisecond of delay in a test is half of C/k
+    assert base.T0_N < 1.0
+
+
+def test_a_seal_has_one_friction_at_every_voltage(rng: np.random.Generator) -> None:
+    voltages = (0.0, 50.0, 100.0)
+    rows = tuple(BaseRow(voltage_V=v, T0_N=20.0 + 3.0 * v, C_Ns_per_m=1200.0, k_N_per_m=9e5) for v in voltages)
+    seal = {"T0_2": 45.0, "k_2": 1.5e5}
+    truth = Damper(base=rows, effects={"second_branch": seal})
+    found = diagnosed(sines(truth, rng, voltages, noise=4e-3, cycles=5, jitter=0.003))
+    assert found.diagnosis.effects == ("second_branch",)
+    assert found.damper.effects["second_branch"] == pytest.approx(seal, rel=0.1)

@@ -26,7 +26,15 @@ from pzd.diagnosis.search.acceptance import Detection, detections
 from pzd.diagnosis.search.candidates import candidates
 from pzd.diagnosis.support import parts
 from pzd.diagnosis.thresholds import LIKELIER_THAN_NOT
-from pzd.diagnosis.verdict import Decision, NuisanceTrend, Verdict, _hints, nuisance_trend, with_parts_told
+from pzd.diagnosis.verdict import (
+    Decision,
+    NuisanceTrend,
+    Verdict,
+    _hints,
+    knee_note,
+    nuisance_trend,
+    with_parts_told,
+)
 from pzd.record import Array, Record, sliced
 
 TESTS = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.03))
@@ -438,9 +446,6 @@ def test_a_little_of_another_law_of_the_same_place_may_be_how_the_first_one_real
 @pytest.mark.parametrize(
     ("voltage", "adopted", "rivals", "verdict", "words"),
     [
-        (None, {"rounded_yield": {"w_s": 0.01}}, (), "unexplained", "identify.law: auto tries the knee law"),
-        (0.0, {"rounded_yield": {"w_s": 0.01}}, (), "unexplained", ""),
-        (None, {"rounded_yield": {"w_s": 0.01}}, (), "named", ""),
         (0.0, {"valve_lag": {"tau": 0.09}}, ("piezo_hysteresis",), "ambiguous", "at rates farther apart tells a lag"),
         (0.0, {"valve_lag": {"tau": 0.09}}, (), "named", ""),
     ],
@@ -455,3 +460,19 @@ def test_a_verdict_says_what_else_looks_alike_and_what_would_tell(
     said = "; ".join(_hints(adoption, Decision(verdict, "", None)))
     assert words in said
     assert bool(said) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("law", "verdict", "voltage", "told"),
+    [
+        ("bingham", "unexplained", None, True),
+        ("auto", "unexplained", None, False),
+        ("bingham", "named", None, False),
+        ("bingham", "unexplained", 0.0, False),
+    ],
+)
+def test_a_passive_damper_of_which_something_has_no_name_is_sent_to_the_knee_law(
+    law: str, verdict: Verdict, voltage: float | None, *, told: bool
+) -> None:
+    base = (BaseRow(voltage_V=voltage, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6),)
+    assert ("identify: {law: auto}" in knee_note(law, verdict, base)) is told

@@ -380,7 +380,9 @@ def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_
     path = stored(tmp_path / "a.csv", ["time_s,displacement_m,force_N"], columns, ",")
     (line,) = [line for line in guessed([path]) if line == "# car: false"]
     (tmp_path / "guess.yaml").write_text("\n".join([line.removeprefix("# "), *guessed([path])]), encoding="utf-8")
-    assert not load(tmp_path / "guess.yaml").car
+    config = load(tmp_path / "guess.yaml")
+    assert not config.car
+    assert config.identify.law == "auto"  # a passive damper is seldom one T0 and C
     driven = stored(tmp_path / "b_100V.csv", ["time_s,displacement_m,force_N"], columns, ",")
     assert "# car: false" not in guessed([driven])
 

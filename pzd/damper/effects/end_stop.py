@@ -20,7 +20,7 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
 
 
 _K_E_SEARCH = Search(lambda s: s.force / s.stroke**2, (0.5,))
-_X_E_SEARCH = Search(lambda s: s.stroke, (0.35, 0.7, 0.9), within=(0.3, 0.95))
+_X_E_SEARCH = Search(lambda s: s.stroke, (0.35, 0.7, 0.9), within=(0.3, 0.99))
 
 EFFECT = Effect(
     name="end_stop",

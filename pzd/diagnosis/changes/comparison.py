@@ -51,6 +51,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.next_test import operating_envelope, separating_test
+from pzd.diagnosis.verdict import knee_note
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify as run_identify
@@ -157,7 +158,7 @@ def findings_between(
         regression, candidates(first, comparisons), diagnose.adopt_bic, diagnose.rival_bic, diagnose.visible
     )
     best = search.run()
-    return Findings(first, search, best, diagnose, control, before, after)
+    return Findings(first, search, best, diagnose, control, before, after, identify.law)
 
 
 def changes_between_rigs(
@@ -382,6 +383,8 @@ class Findings:
     control: Control
     before: State
     after: State
+    law: str
+    """`identify.law` of the first state."""
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
@@ -397,6 +400,8 @@ class Findings:
         }
         difference = self.difference(best)
         reported = self._reported(best)
+        still = self._still(best, reported)
+        reported = [change for change in reported if change not in still]
         zero = self._displacement_zero()
         of_damper = [change for change in reported if change.of == "damper"]
         verdict: Verdict = "changed" if of_damper else "unchanged"
@@ -422,7 +427,8 @@ class Findings:
             reason.append(
                 f"{', '.join(unreached)} acts where no test of {self.before.name} came, and may have been there before"
             )
-        unchanged = tuple(each for each in self._unchanged(best) if each.name not in told)
+        as_before = [_as_before(change) for change in still]
+        unchanged = tuple(each for each in (*as_before, *self._unchanged(best)) if each.name not in told)
         if verdict == "unchanged" and (beside := self._left_out_differs() or self._beyond_the_model(best)):
             verdict, reason = "unexplained", [*reason, beside]
         elif verdict == "unchanged" and (beside := self._at_one_condition(best)):
@@ -437,7 +443,7 @@ class Findings:
             changes=tuple(listed),
             unchanged=unchanged,
             rivals=tuple(told),
-            reason="; ".join(reason),
+            reason="; ".join(reason) + knee_note(self.law, verdict, self.first.damper.base),
             next_test=self._next_test(best, rivals),
         )
 
@@ -717,6 +723,16 @@ class Findings:
             reason=f"adopted: it makes {100.0 * share:.3g} % of the difference, {visible}",
         )
 
+    def _still(self, best: Fitted, reported: Sequence[Change]) -> list[Change]:
+        """Return the numbers of laws of both states that are as they were, where others of the same law are not."""
+        by_key = {(change.name, change.parameter): change for change in reported}
+        found = []
+        for candidate in best.candidates:
+            own = [by_key[key] for key in candidate.key if key in by_key]
+            held = [change for change in own if _holds_what_was(change)]
+            found += held if len(held) < len(own) and not candidate.absent else []
+        return found
+
     def _values(
         self, mine: Sequence[tuple[Coordinate, float, float]]
     ) -> tuple[tuple[float, ...] | None, Numbers, Numbers, Numbers, Numbers]:
@@ -950,6 +966,22 @@ class Findings:
                 )
             )
         return tuple(found)
+
+
+def _holds_what_was(change: Change) -> bool:
+    """Whether the interval of a changed quantity holds its value in the first state, at every control signal."""
+    was, low, high = (
+        np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (change.from_, change.low95, change.high95)
+    )
+    return bool(np.all((low <= was) & (was <= high)))  # of what no test shows none is held
+
+
+def _as_before(change: Change) -> Unchanged:
+    """Return a quantity that is as it was."""
+    return Unchanged(
+        name=change.name, parameter=change.parameter, unit=change.unit, from_=change.from_, to=change.to,
+        low95=change.low95, high95=change.high95, at_voltage_V=change.at_voltage_V,
+    )  # fmt: skip
 
 
 def _digits(value: float, count: int = 3) -> str:

@@ -60,13 +60,15 @@ def _misplaced(candidate: Candidate, stroke: float) -> str | None:
 
 
 def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
-    """Say why an end stop is none by where it begins; None where that is near an end of the half stroke [m].
+    """Say why an end stop is none by where it begins; None where that is towards an end of the half stroke [m].
 
     At one end alone it is one: a bump stop, or a stroke that is off the middle.
     """
     begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
     if float(np.min(begins)) - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
+    if float(np.min(begins)) - abs(damper.zero_m) > thresholds.END_STOP_BEGINS_BY * stroke:
+        return "stand-in: begins where the tests turn round, as everything at a reversal does"
     return None
 
 

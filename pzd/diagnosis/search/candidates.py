@@ -67,20 +67,16 @@ def most_promising(
     """
     _ = before.column_basis  # needed by every effect: computed once, before they go to threads of their own
 
-    def promise(own: Problem, effect: Effect) -> Promise:
-        values = (reached or {}).get(effect.name)
+    def promise(effect: Effect) -> Promise:
+        own, values = problem.with_friction_scaling(effect), (reached or {}).get(effect.name)
         starts = starts_of(own, before, effect)
         starts = starts if values is None or values.size != starts[0].size else [values]
         found = [(_promised_misfit(own, before, effect, start), start) for start in starts]
         misfit, start = min(found, key=lambda each: each[0])
         return Promise(effect, own, start, misfit)
 
-    # What changes with the voltage as T0 does may as well be a seal, which knows no voltage.
-    asked = [
-        (own, effect) for effect in effects for own in dict.fromkeys((problem.with_friction_scaling(effect), problem))
-    ]
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        return sorted(pool.map(lambda each: promise(*each), asked), key=lambda each: each.misfit)
+        return sorted(pool.map(promise, effects), key=lambda each: each.misfit)
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:

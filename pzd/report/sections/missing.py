@@ -96,7 +96,8 @@ def verdict(context: ReportContext) -> str:
         text = f"These tests do not settle whether anything is missing{f'; possible: {rivals}' if rivals else ''}"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
-        text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
+        also = f"; also possible: {rivals}" if rivals else ""
+        text = f"These tests do not settle what is missing. Best: {adopted or DASH}{also}"
     elif diagnosis.verdict == "none":
         name = context.damper.baseline_name
         text = f"Nothing is missing: what the {name} leaves is within the noise and the scatter between tests"

@@ -518,6 +518,11 @@ _WITHOUT_CAR = (
     "# car: false",
 )
 
+_PASSIVE = (
+    "identify: {law: auto}    # bleed, knee and blow-off of a passive damper, where they predict better than T0 and C"
+)
+"""One T0 and C are no law of a road or race damper: what it has beside them would be told as missing."""
+
 
 def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     """Guess a config for rig files, with empty places where only a person knows the answer.
@@ -545,7 +550,7 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
     lines.append(_REBOUND)
     if not any(entry.controlled for entry in entries):
-        lines += [*_maybe_control(found), *_WITHOUT_CAR]
+        lines += [*_maybe_control(found), *_WITHOUT_CAR, _PASSIVE]
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {written(control.unit)}}}")
     settings = {setting for entry in entries for setting in entry.settings}

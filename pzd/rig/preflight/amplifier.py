@@ -221,11 +221,11 @@ def _saturation(section: Section) -> tuple[ReferenceFit, Finding | None]:
         return best, None
     return best, Finding(
         check="range",
-        where=f"force, {'cut off' if cut else 'bends over'} near {peak:.4g} N, with noise on top",
+        where=f"force, {'cut off' if cut else 'bends over'} near {peak:.4g} N beneath its noise",
         size=missing,
         unit="N",
         follows="so much is missing at the peak, and of C as well, if the amplifier saturates; where a larger range "
-        "shows the same, the damper itself gives way (relief valve, shear thinning)",
+        "shows the same, the damper itself gives way (relief valve, shear thinning), or gas hardens at the other end",
     )
 
 

@@ -69,15 +69,15 @@ def sine(
     return Record(name, None, t, x + 2e-6 * draw(t.size), v, a, measured, recorded)
 
 
-def state_of(name: str, records: Iterable[Record]) -> State:
+def state_of(name: str, records: Iterable[Record], config: IdentifyConfig | None = None) -> State:
     rig = Rig(tuple(records), ())
-    return State.of(name, rig, identify(IdentifyConfig(), rig, 1), None, Control())
+    return State.of(name, rig, identify(config or IdentifyConfig(), rig, 1), None, Control())
 
 
-def found(before: Iterable[Record], after: Iterable[Record]) -> Changes:
+def found(before: Iterable[Record], after: Iterable[Record], config: IdentifyConfig | None = None) -> Changes:
     """What changed, the first state identified and not diagnosed."""
-    states = state_of("new", before), state_of("aged", after)
-    return changes_between(*states, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+    states = state_of("new", before, config), state_of("aged", after, config)
+    return changes_between(*states, DiagnoseConfig(), config or IdentifyConfig(), Control()).changes
 
 
 def likelihood_between(before: Iterable[Record], after: Iterable[Record]) -> Likelihood:

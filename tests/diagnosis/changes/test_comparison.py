@@ -26,8 +26,12 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.fit.intervals import LEVEL
+from pzd.identification.config import IdentifyConfig
 from pzd.record import Record
 from pzd.schema.errors import DataError
+
+WIDE = ((0.5, 0.02), (1.0, 0.03), (2.0, 0.02), (2.0, 0.03), (3.5, 0.03))
+"""Motions that reach beyond both knees."""
 
 
 def test_the_same_damper_run_twice_did_not_change(rng: np.random.Generator) -> None:
@@ -450,3 +454,30 @@ def test_what_changed_at_one_control_signal_and_temperature_alone_is_not_called_
     assert changes.verdict == verdict
     assert ("at 120 V and 50 degC" in changes.reason) == (factor != 1.0)
     assert ("C" in {each.name for each in changes.unchanged}) == (factor == 1.0)
+
+
+def test_a_thinner_oil_changes_every_number_of_the_knee_law_and_leaves_seal_and_gas(rng: np.random.Generator) -> None:
+    row = BaseRow(T0_N=25.0, C_Ns_per_m=2200.0, k_N_per_m=3.8e6)
+    law = {"beta": 0.33, "F_reb": 500.0, "C_reb": 800.0, "F_comp": 350.0, "C_comp": 450.0}
+    beside = {"preload_offset": {"F_0": -180.0}, "gas_spring": {"k_g": 1500.0}}
+    thinner = {name: value * (1.0 if name == "beta" else 0.88) for name, value in law.items()}
+    thin = row.model_copy(update={"C_Ns_per_m": 0.88 * row.C_Ns_per_m})
+    before = Damper(base=(row,), effects={"knee": law, **beside})
+    after = Damper(base=(thin,), effects={"knee": thinner, **beside})
+    changes = found(campaign(before, rng, WIDE), campaign(after, rng, WIDE), IdentifyConfig(law="knee"))
+    assert changes.verdict == "changed"
+    assert {(c.name, c.parameter) for c in changes.changes} == {
+        ("C", "C"), ("knee", "F_reb"), ("knee", "C_reb"), ("knee", "F_comp"), ("knee", "C_comp")
+    }  # fmt: skip
+    assert all(change.to == pytest.approx(0.88 * change.from_, rel=0.02) for change in changes.changes)
+    assert {"T0", "beta", "k_g", "F_0"} <= {each.parameter for each in changes.unchanged}
+
+
+def test_of_a_law_in_which_one_side_changed_the_other_side_is_as_it_was(rng: np.random.Generator) -> None:
+    row = BaseRow(T0_N=25.0, C_Ns_per_m=2200.0, k_N_per_m=3.8e6)
+    law = {"beta": 0.33, "F_reb": 500.0, "C_reb": 800.0, "F_comp": 350.0, "C_comp": 450.0}
+    shim = {**law, "F_comp": 280.0, "C_comp": 380.0}
+    before, after = (campaign(Damper(base=(row,), effects={"knee": own}), rng, WIDE) for own in (law, shim))
+    changes = found(before, after, IdentifyConfig(law="knee"))
+    assert {(c.name, c.parameter) for c in changes.changes} == {("knee", "F_comp"), ("knee", "C_comp")}
+    assert {each.parameter for each in changes.unchanged if each.name == "knee"} == {"beta", "F_reb", "C_reb"}
