@@ -107,6 +107,15 @@ LAW_ERROR = 0.05
 
 Reason: 22 % as r.m.s.: soft knees of valves, other roots for a rounded yield and rubber on the faces of a play left
 1 to 4 % for a second law of the same place (five rigs by a simulator of other authorship)."""
+LAGS_TRIED = (0.01, 0.03, 0.1)
+"""C/k of the oil spring behind a branch that takes the friction over, as shares of stroke over speed.
+
+Reason: a fit gives a friction that turns at once a spring that is far too stiff, whatever that of the oil; each of
+these is within a factor of two of every lag between."""
+GIVES_TRIED = (1e-4, 1e-2)
+"""Way of such a branch until it slips, as shares of the stroke.
+
+Reason: of a seal that turns at once, and of one that gives by a tenth of a millimetre; not tuned."""
 END_STOP_BEGINS = 0.4
 """Share of the half stroke about its middle within which no end stop begins.
 

@@ -416,7 +416,27 @@ def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str,
                 if (u.effect, u.parameter.name) == (name, parameter.name)
             ]
             found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes, control)
+    for (name, parameter_name), sign in CONSTANT_FORCES.items():
+        if name in found:
+            found[name][parameter_name] = _of_seal_or_valve(found[name][parameter_name], damper, sign)
     return found
+
+
+CONSTANT_FORCES = {("preload_offset", "F_0"): 1.0, ("accumulator", "F_g"): -1.0}
+"""Forces that do not change with the motion, by effect and parameter, with their sign in the force of the damper."""
+
+
+def _of_seal_or_valve(value: Value, damper: Damper, sign: float) -> Value:
+    """Return a constant force with an interval that holds it also where the friction is no asymmetric one.
+
+    A friction T0 (1 + alpha sign F) has a mean of alpha T0, which one the same both ways, as of a seal, leaves to the
+    constant force: at one T0 no test tells them apart.
+    """
+    alpha, low, high = damper.effects.get("asymmetry", {}).get("alpha", 0.0), value.low95, value.high95
+    if not (isinstance(alpha, float) and isinstance(low, float) and isinstance(high, float)):
+        return value
+    other = sign * alpha * min(row.T0_N for row in damper.base)
+    return value.model_copy(update={"low95": min(low, low + other), "high95": max(high, high + other)})
 
 
 def _value(

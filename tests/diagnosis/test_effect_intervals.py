@@ -10,6 +10,7 @@ import pytest
 from synthetic import all_but, damper_of, diagnosed, sine, sines
 
 from pzd.damper.effects import library
+from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import FitResult, base_half_widths, fit, standard_errors
@@ -154,3 +155,20 @@ def test_t0_c_and_k_of_tests_that_repeat_are_as_near_as_all_of_them_show(rng: np
     for row, true in zip(found.damper.base, truth.base, strict=True):
         found_row, true_row = ([each.T0_N, each.C_Ns_per_m, each.k_N_per_m] for each in (row, true))
         assert found_row == pytest.approx(true_row, rel=0.002)
+
+
+def test_a_preload_is_not_surer_than_whether_the_friction_is_asymmetric_as_the_valve_is(
+    rng: np.random.Generator,
+) -> None:
+    """A seal rubs alike both ways; the law of the library makes its friction as asymmetric as the damping."""
+    row, alpha = BaseRow(voltage_V=0.0, T0_N=60.0, C_Ns_per_m=1500.0, k_N_per_m=4e6), 0.2
+    tests = ((1.0, 0.01), (1.0, 0.025), (2.5, 0.01), (2.5, 0.025))
+    plain = sines(Damper(base=(row,)), rng, (0.0,), tests=tests, noise=3e-3, cycles=5, jitter=0.0)
+    records = [replace(r, force=r.force + alpha * 1500.0 * np.abs(r.velocity) - 20.0) for r in plain]
+    found = diagnosed(records).diagnosis
+    assert {"asymmetry", "preload_offset"} <= set(found.effects)
+    (estimate,) = found.parameters["preload_offset"]["F_0"].estimates
+    assert estimate.low95 is not None
+    assert estimate.high95 is not None
+    assert estimate.low95 <= -20.0 <= estimate.high95
+    assert estimate.high95 - estimate.low95 < 25.0

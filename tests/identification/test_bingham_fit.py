@@ -134,9 +134,8 @@ def test_a_rigid_damper_without_a_pre_slip_branch_still_gets_positive_starts() -
     assert min(graphical_start([prepare(record)])) > 0.0
 
 
-def test_a_rigid_friction_is_found_though_noise_hides_where_the_rod_turns() -> None:
+def test_a_rigid_friction_is_found_though_noise_hides_where_the_rod_turns(rng: np.random.Generator) -> None:
     """Near a slow reversal coarse steps of the channel make the rod seem to go back: no sample there tells the side."""
-    rng = np.random.default_rng(20261129)
     time = np.arange(0.0, 10.0, 1.0 / 500.0)
     phase = 2.0 * np.pi * np.cumsum(np.linspace(0.3, 4.0, time.size)) / 500.0
     x = 4e-3 * np.sin(phase)

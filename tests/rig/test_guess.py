@@ -387,6 +387,14 @@ def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_
     assert "# car: false" not in guessed([driven])
 
 
+def test_of_two_columns_of_one_name_that_in_newtons_is_the_force_beside_that_in_volts(tmp_path: Path) -> None:
+    lines = ["Time,Force,Force,Position", "(s),(V),(N),(m)"]
+    columns = [numbers(values) for values in (TIME, 0.01 * FORCE, FORCE, X)]
+    path = stored(tmp_path / "a.csv", lines, columns, ",")
+    (record,) = read_back(tmp_path, [path]).records
+    np.testing.assert_allclose(record.force, FORCE, rtol=1e-3, atol=1e-3 * np.ptp(FORCE))
+
+
 # ---------------------------------------------------------------- headers of the world, and what is no test
 
 

@@ -271,15 +271,6 @@ def late_instead_of_elastic(problem: Problem, before: FitResult, effect: Effect)
     return np.append(rows, tau.to_search(lag))
 
 
-LAGS_TRIED = (0.01, 0.03, 0.1)
-"""C/k of the oil spring behind a branch that takes the friction over, as shares of stroke over speed.
-
-Reason: a fit gives a friction that turns at once a spring that is far too stiff, whatever that of the oil; each of
-these is within a factor of two of every lag between."""
-GIVES_TRIED = (1e-4, 1e-2)
-"""Way of that branch until it slips, as a share of the stroke: a seal that turns at once, and one that gives."""
-
-
 def friction_beside_oil(problem: Problem, before: FitResult, effect: Effect) -> Array | None:
     """Return a start (3 b + e,) at which the branch takes over the friction that the element has at every voltage.
 
@@ -314,7 +305,9 @@ def friction_beside_oil(problem: Problem, before: FitResult, effect: Effect) -> 
     every = problem.unknowns((*before.effects, effect.name))
     stroke = problem.scales.stroke
     duration = stroke / (problem.scales.speed or 1.0)
-    starts = [start(lag * duration, give * stroke) for lag in (0.0, *LAGS_TRIED) for give in GIVES_TRIED]
+    starts = [
+        start(lag * duration, give * stroke) for lag in (0.0, *thresholds.LAGS_TRIED) for give in thresholds.GIVES_TRIED
+    ]
     misfits = [float(np.sum(linearise(problem, every, each, limits, frictions).stacked ** 2)) for each in starts]
     return starts[int(np.argmin(misfits))]
 

@@ -18,7 +18,7 @@ from pzd.record import Array
 from pzd.rig.config import FileSplit, Fixture
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout, Values
 from pzd.rig.files.sheet import IN_STEP, NO_SAMPLE, ReadingStep, Sheet
-from pzd.rig.files.units import UnitError, factor_in, in_header, to_canonical
+from pzd.rig.files.units import UnitError, columns_under, factor_in, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import nearest
 from pzd.schema.yamltree import written
@@ -234,7 +234,8 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
     data_faults: list[str] = []
     config_faults: list[str] = []
     for spec in layout.channels:
-        columns = [index for index, head in enumerate(sheet.header) if head in spec.headers]
+        heads_there = [head for head in dict.fromkeys(sheet.header) if head in spec.headers]
+        columns = [c for head in heads_there for c in columns_under(head, sheet.header, sheet.units, spec.own)]
         if len(columns) > 1:
             heads = " and ".join(sheet.header[c] for c in columns)
             data_faults.append(

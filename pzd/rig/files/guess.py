@@ -47,7 +47,7 @@ from pzd.rig.files.sniffing import (
     unit_of,
     value_in_names,
 )
-from pzd.rig.files.units import factor_in, in_header
+from pzd.rig.files.units import RECORDED, columns_under, factor_in, in_header
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.measures import work
@@ -140,10 +140,10 @@ class SniffedFile:
     form: str
     """Name of its format."""
 
-    def unit_below(self, head: str) -> str | None:
-        """Return what the row of units says of a column; None where there is none."""
+    def unit_below(self, head: str, quantity: Quantity) -> str | None:
+        """Return what the row of units says of the column of a quantity; None where there is none."""
         units = self.dialect.units
-        return units[self.dialect.header.index(head)] if units else None
+        return units[columns_under(head, self.dialect.header, units, quantity)[0]] if units else None
 
     @cached_property
     def above(self) -> tuple[str, ...]:
@@ -329,7 +329,7 @@ def _asked_columns(
 def _asked_units(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:
     """Write the empty places of units of columns that are asked for, where their headers name none."""
     for quantity in missing:
-        heads = [(head, file.unit_below(head)) for head in _candidates(file, columns, quantity)]
+        heads = [(head, file.unit_below(head, quantity)) for head in _candidates(file, columns, quantity)]
         first = dict(zip(file.dialect.header, file.dialect.first, strict=False))
         forms = {_date_format(first.get(head, "")) for head, _ in heads}
         if quantity is TIME and len(forms) == 1 and None not in forms:
@@ -345,7 +345,7 @@ _OFTEN = {TIME: "s", DISPLACEMENT: "mm", FORCE: "N"}
 def _candidates(file: SniffedFile, columns: dict[Quantity, str], quantity: Quantity) -> list[str]:
     """Return the headers that may hold a quantity: in a unit of it, in none, or in one of the recorder."""
     filled = [head for head in file.dialect.header if head.strip()]
-    may = [head for head in filled if _may_hold(head, file.unit_below(head), quantity)]
+    may = [head for head in filled if _may_hold(head, file.unit_below(head, quantity), quantity)]
     free = [head for head in may if head not in columns.values()]
     # Else one of a quantity that a file may go without: a load cell in volts looks like a control signal.
     motion = (*NEEDED, VELOCITY, ACCELERATION)
@@ -354,11 +354,7 @@ def _candidates(file: SniffedFile, columns: dict[Quantity, str], quantity: Quant
 
 def _may_hold(head: str, below: str | None, quantity: Quantity) -> bool:
     unit = below.strip("[]() ") if below and below.strip("[]() ") else in_header(head, quantity)
-    return not unit or unit in _RECORDER or unit_of(head, below, quantity) is not None
-
-
-_RECORDER = ("V", "mV", "Volt", "Volts", "count", "counts", "bit", "digit", "-", "%")
-"""Units of a recorder, of which one stands for so much of the quantity."""
+    return not unit or unit in RECORDED or unit_of(head, below, quantity) is not None
 
 
 def _rate(file: SniffedFile) -> float | None:
@@ -416,7 +412,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
 def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
     """Write the units that the reader would not see by itself, and leave empty those that are unknown."""
     for quantity, column in named.items():
-        index = dialect.header.index(column)
+        index = columns_under(column, dialect.header, dialect.units, quantity)[0]
         below = dialect.units[index] if dialect.units else None
         unit = unit_of(column, below, quantity)
         dated = _date_format(dialect.first[index]) if quantity is TIME else None
@@ -432,16 +428,18 @@ def _recorded(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
     """Whether force or displacement is in units of the recorder, so that its sign comes with the calibration."""
     heads = [(columns[quantity], quantity) for quantity in (DISPLACEMENT, FORCE)]
     units = (
-        below.strip("[]() ") if (below := file.unit_below(head)) and below.strip("[]() ") else in_header(head, quantity)
+        below.strip("[]() ")
+        if (below := file.unit_below(head, quantity)) and below.strip("[]() ")
+        else in_header(head, quantity)
         for head, quantity in heads
     )
-    return any(unit in _RECORDER for unit in units)
+    return any(unit in RECORDED for unit in units)
 
 
 def _lacking(column: str, below: str | None, quantity: Quantity) -> str:
     """Say what a column lacks to be read."""
     recorded = below.strip("[]() ") if below and below.strip("[]() ") else in_header(column, quantity)
-    if recorded in _RECORDER:
+    if recorded in RECORDED:
         return (
             f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}; with its zero "
             f"-200 {quantity.unit}/{recorded} about 2.5 {recorded}, or about the mean of the first 10"
@@ -497,7 +495,8 @@ def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
         return False
     if not heads <= set(sheet.header):
         return False
-    places = (sheet.header.index(columns[quantity]) for quantity in (DISPLACEMENT, FORCE))
+    both = (DISPLACEMENT, FORCE)
+    places = (columns_under(columns[each], sheet.header, sheet.units, each)[0] for each in both)
     x, force = (sheet.numbers.get(place, np.empty(0)) for place in places)
     if not (x.size == force.size > 2 and np.isfinite(x).all() and np.isfinite(force).all()):
         return False
@@ -590,7 +589,7 @@ def _maybe_control(files: Sequence[SniffedFile]) -> list[str]:
         for file in files
         for head in file.dialect.header
         for control in CONTROLS
-        if quantity_of(head, below := file.unit_below(head), control) is None
+        if quantity_of(head, below := file.unit_below(head, own_quantity(VOLTAGE, control)), control) is None
         and unit_of(head, below, own_quantity(VOLTAGE, control)) is not None
     }
     return [
@@ -676,7 +675,9 @@ def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str
             return f"{curve}{{curve: {path}}}"
         return f"{curve}{{curve: {path}, sign: 1}}, or sign: -1 where positive velocities compress"
     accelerations = [
-        head for head in heads if unit_of(_accelerated(head), file.unit_below(head), ACCELERATION) is not None
+        head
+        for head in heads
+        if unit_of(_accelerated(head), file.unit_below(head, ACCELERATION), ACCELERATION) is not None
     ]
     if accelerations and FORCE not in columns and DISPLACEMENT not in columns:
         return "accelerations of a ride, and no test of a damper: pzd rate rates them"

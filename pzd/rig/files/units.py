@@ -8,6 +8,7 @@ never a guess.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -98,6 +99,26 @@ _FACTOR_IN_HEADER = re.compile(
 
 class UnitError(ValueError):
     """A unit that is unknown or of another quantity, with what to write instead."""
+
+
+RECORDED = ("V", "mV", "Volt", "Volts", "count", "counts", "bit", "digit", "-", "%")
+"""Units of a recorder, of which one stands for so much of the quantity."""
+
+
+def columns_under(head: str, header: Sequence[str], units: Sequence[str] | None, quantity: Quantity) -> list[int]:
+    """Return the columns of a header: where several have it, that which the row of units tells alone is no raw signal.
+
+    Examples
+    --------
+    >>> from pzd.quantities import FORCE
+    >>> columns_under("Force", ["Time", "Force", "Force"], ["(s)", "(V)", "(lb)"], FORCE)
+    [2]
+    """
+    columns = [index for index, each in enumerate(header) if each == head]
+    if len(columns) < 2 or units is None or quantity.unit in RECORDED:
+        return columns
+    own = [column for column in columns if units[column].strip("[]() ") not in RECORDED]
+    return own if len(own) == 1 else columns
 
 
 def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
