@@ -166,7 +166,7 @@ NOISE_TO_TURN = 4.0
 Reason: that noise is told up to two times too small (`displacement_error_of`); two of its standard deviations."""
 
 
-def hidden_direction(displacement: Array, noise: float, *, closed: bool = False) -> Mask:
+def hidden_direction(displacement: Array, noise: float) -> Mask:
     """Find the samples at which noise of the displacement hides which way the rod goes.
 
     These are near a reversal, and wherever the rod seems to go back by less than noise can do. A friction there pushes
@@ -176,7 +176,6 @@ def hidden_direction(displacement: Array, noise: float, *, closed: bool = False)
     ----------
     displacement : (n,) cleaned [m]
     noise : r.m.s. that is left in it [m]
-    closed : whether the last sample is followed by the first
 
     Examples
     --------
@@ -184,26 +183,21 @@ def hidden_direction(displacement: Array, noise: float, *, closed: bool = False)
     >>> np.flatnonzero(hidden_direction(x, 0.1)).tolist()
     [2, 4, 5, 6]
     """
-    size, within = displacement.size, NOISE_TO_TURN * noise
-    found, x = np.zeros(size, dtype=np.bool_), displacement
-    if closed:
-        x = np.concatenate([x, x, x])
+    hidden, within = np.zeros(displacement.size, dtype=np.bool_), NOISE_TO_TURN * noise
     travel = float(np.ptp(displacement))
     if not 0.0 < within < travel:
-        return found
-    share = max(SMALL_STROKE, within / travel)
-    hidden = np.zeros(x.size, dtype=np.bool_)
-    for vertex, top in _vertices(x, share):
+        return hidden
+    for vertex, top in _vertices(displacement, within / travel):
         turn = round(vertex)
-        far = np.abs(x - top) >= within
+        far = np.abs(displacement - top) >= within
         low = turn - int(np.argmax(np.append(far[turn::-1], True)))
         high = turn + int(np.argmax(np.append(far[turn:], True)))
         if high - low > 2:  # a sample at the vertex alone is hidden by no noise
             hidden[low + 1 : high] = True
-    for stroke in np.split(np.arange(x.size), reversals(x, share)):
-        forward = np.sign(x[stroke[-1]] - x[stroke[0]]) * x[stroke]
+    for stroke in np.split(np.arange(displacement.size), reversals(displacement, within / travel)):
+        forward = np.sign(displacement[stroke[-1]] - displacement[stroke[0]]) * displacement[stroke]
         hidden[stroke] |= forward < np.maximum.accumulate(forward)
-    return np.asarray(hidden[size : 2 * size] if closed else hidden)
+    return hidden
 
 
 def jump_timing_error(measured: Array, predicted: Array, *, closed: bool = False) -> Array:
