@@ -17,6 +17,7 @@ from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRo
 from pzd.artefacts.diagnosis import Support
 from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow, Damper, against_nature
+from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
 from pzd.diagnosis.campaign import Campaign, nearest_row
@@ -628,6 +629,37 @@ def knee_note(law: str, verdict: str, base: Sequence[BaseRow]) -> str:
     if law != "bingham" or verdict != "unexplained" or not passive:
         return ""
     return "; a passive damper has bleed, knee and blow-off: identify: {law: auto} tries that law"
+
+
+MUCH_BY_TEMPERATURE = 0.05
+"""Change of T0 or C from the coldest to the warmest condition that is told: what a few kelvin make of an oil."""
+
+
+def temperature_note(base: Sequence[BaseRow]) -> str:
+    """Say how T0 and C follow the temperature, where they are those of each: no drift is missing beside them.
+
+    Parameters
+    ----------
+    base : rows of the damper without effects
+    """
+    changes: dict[str, list[float]] = {"T0": [], "C": []}
+    ends: list[float] = []
+    for _, rows in rows_per_voltage(base):
+        known = sorted(
+            (row.temperature_degC, row.T0_N, row.C_Ns_per_m) for row in rows if row.temperature_degC is not None
+        )
+        if len(known) < 2:
+            continue
+        (cold, *before), (warm, *after) = known[0], known[-1]
+        ends += [cold, warm]
+        for name, one, other in zip(changes, before, after, strict=True):
+            changes[name] += [other / one - 1.0] if one > 0.0 else []
+    told = {name: float(np.mean(values)) for name, values in changes.items() if values}
+    much = [f"{name} {100.0 * change:+.2g} %" for name, change in told.items() if abs(change) >= MUCH_BY_TEMPERATURE]
+    if not much:
+        return ""
+    span = f"from {min(ends):.3g} to {max(ends):.3g} degC"
+    return f"; T0, C and k are those of each temperature: {' and '.join(much)} {span}"
 
 
 def no_prediction_note(prediction: Prediction | None) -> str:

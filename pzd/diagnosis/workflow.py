@@ -59,6 +59,7 @@ from pzd.diagnosis.verdict import (
     no_prediction_note,
     no_slip_diagnosis,
     nuisance_trend,
+    temperature_note,
     with_parts_told,
 )
 from pzd.fit.intervals import LEVEL
@@ -127,12 +128,13 @@ def diagnose_setting(
         data.saturation_note(saturated),
         data.drift_note(drift),
     )
-    another_law = knee_note(identify.law, decision.verdict, baseline.base)
+    beside = knee_note(identify.law, decision.verdict, baseline.base)
+    beside += "" if "temperature_drift" in selection.adopted else temperature_note(baseline.base)
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason="".join((decision.reason, another_law, judged.zeros, campaign.budget.note, *limits, _hum(before))),
+        reason="".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before))),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),

@@ -33,6 +33,7 @@ from pzd.diagnosis.verdict import (
     _hints,
     knee_note,
     nuisance_trend,
+    temperature_note,
     with_parts_told,
 )
 from pzd.record import Array, Record, sliced
@@ -476,3 +477,15 @@ def test_a_passive_damper_of_which_something_has_no_name_is_sent_to_the_knee_law
 ) -> None:
     base = (BaseRow(voltage_V=voltage, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6),)
     assert ("identify: {law: auto}" in knee_note(law, verdict, base)) is told
+
+
+@pytest.mark.parametrize(("fall", "told"), [(0.16, "C -16 % from 24 to 57 degC"), (0.01, "")])
+def test_a_fade_that_t0_and_c_of_each_temperature_hold_is_told(fall: float, told: str) -> None:
+    base = tuple(
+        BaseRow(voltage_V=v, temperature_degC=t, T0_N=100.0, C_Ns_per_m=c, k_N_per_m=1e6)
+        for v in (0.0, 100.0)
+        for t, c in ((24.0, 1500.0), (57.0, (1.0 - fall) * 1500.0))
+    )
+    assert temperature_note(base).endswith(told)
+    assert bool(temperature_note(base)) is bool(told)
+    assert not temperature_note(base[::2])
