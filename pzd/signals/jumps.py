@@ -187,14 +187,15 @@ def hidden_direction(displacement: Array, noise: float) -> Mask:
     travel = float(np.ptp(displacement))
     if not 0.0 < within < travel:
         return hidden
-    for vertex, top in _vertices(displacement, within / travel):
+    share = max(SMALL_STROKE, within / travel)
+    for vertex, top in _vertices(displacement, share):
         turn = round(vertex)
         far = np.abs(displacement - top) >= within
         low = turn - int(np.argmax(np.append(far[turn::-1], True)))
         high = turn + int(np.argmax(np.append(far[turn:], True)))
         if high - low > 2:  # a sample at the vertex alone is hidden by no noise
             hidden[low + 1 : high] = True
-    for stroke in np.split(np.arange(displacement.size), reversals(displacement, within / travel)):
+    for stroke in np.split(np.arange(displacement.size), reversals(displacement, share)):
         forward = np.sign(displacement[stroke[-1]] - displacement[stroke[0]]) * displacement[stroke]
         hidden[stroke] |= forward < np.maximum.accumulate(forward)
     return hidden
