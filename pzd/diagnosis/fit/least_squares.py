@@ -298,9 +298,9 @@ oil is; beyond this the force of a sine falls by a fiftieth."""
 
 
 def _softest(problem: Problem) -> list[float]:
-    """Return the stiffness (b,) of each base row at `LARGEST_LAG` [N/m]."""
-    duration = problem.scales.stroke / (problem.scales.speed or 1.0)
-    return [max(row.C_Ns_per_m / (LARGEST_LAG * duration), 1.0) for row in problem.base]
+    """Return the stiffness (b,) of each base row at `LARGEST_LAG` [N/m]; infinite for friction alone, which has no lag."""
+    lag = LARGEST_LAG * problem.scales.stroke / (problem.scales.speed or 1.0)
+    return [row.C_Ns_per_m / lag if row.C_Ns_per_m > 0.0 else np.inf for row in problem.base]
 
 
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:

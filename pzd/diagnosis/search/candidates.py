@@ -292,7 +292,8 @@ def friction_beside_oil(problem: Problem, before: FitResult, effect: Effect) -> 
     def start(lag: float, give: float) -> Array:
         moved, own = rows.copy(), []
         for i, row in enumerate(before.damper.base):
-            stiffness = row.k_N_per_m if lag == 0.0 else max(row.C_Ns_per_m / lag, 1.0)
+            elastic = lag > 0.0 and row.C_Ns_per_m > 0.0  # friction alone has no lag
+            stiffness = row.C_Ns_per_m / lag if elastic else row.k_N_per_m
             left = problem.coordinates.to_search(row.T0_N - float(taken[i]), row.C_Ns_per_m, stiffness)
             moved[3 * i : 3 * i + 3] = left
         for unknown in unknowns:
