@@ -298,7 +298,7 @@ oil is; beyond this the force of a sine falls by a fiftieth."""
 
 
 def _softest(problem: Problem) -> list[float]:
-    """Return the stiffness (b,) of each base row at `LARGEST_LAG` [N/m]; infinite for friction alone, which has no lag."""
+    """Return the stiffness (b,) of each base row at `LARGEST_LAG` [N/m]; infinite for friction alone, without a lag."""
     lag = LARGEST_LAG * problem.scales.stroke / (problem.scales.speed or 1.0)
     return [row.C_Ns_per_m / lag if row.C_Ns_per_m > 0.0 else np.inf for row in problem.base]
 
