@@ -632,28 +632,30 @@ def knee_note(law: str, verdict: str, base: Sequence[BaseRow]) -> str:
 
 
 MUCH_BY_TEMPERATURE = 0.05
-"""Change of T0 or C from the coldest to the warmest condition that is told: what a few kelvin make of an oil."""
+"""Change of T0 or C from the coldest to the warmest condition that is told, and share of the force from which either is
+asked: what a few kelvin make of an oil."""
 
 
-def temperature_note(base: Sequence[BaseRow]) -> str:
+def temperature_note(base: Sequence[BaseRow], speed: float) -> str:
     """Say how T0 and C follow the temperature, where they are those of each: no drift is missing beside them.
 
     Parameters
     ----------
     base : rows of the damper without effects
+    speed : largest of the tests [m/s]; of T0 and C that which makes little of the force there is not told
     """
     changes: dict[str, list[float]] = {"T0": [], "C": []}
     ends: list[float] = []
     for _, rows in rows_per_voltage(base):
         known = sorted(
-            (row.temperature_degC, row.T0_N, row.C_Ns_per_m) for row in rows if row.temperature_degC is not None
+            (row.temperature_degC, row.T0_N, speed * row.C_Ns_per_m) for row in rows if row.temperature_degC is not None
         )
         if len(known) < 2:
             continue
         (cold, *before), (warm, *after) = known[0], known[-1]
         ends += [cold, warm]
         for name, one, other in zip(changes, before, after, strict=True):
-            changes[name] += [other / one - 1.0] if one > 0.0 else []
+            changes[name] += [other / one - 1.0] if one > MUCH_BY_TEMPERATURE * sum(before) else []
     told = {name: float(np.mean(values)) for name, values in changes.items() if values}
     much = [f"{name} {100.0 * change:+.2g} %" for name, change in told.items() if abs(change) >= MUCH_BY_TEMPERATURE]
     if not much:

@@ -129,7 +129,8 @@ def diagnose_setting(
         data.drift_note(drift),
     )
     beside = knee_note(identify.law, decision.verdict, baseline.base)
-    beside += "" if "temperature_drift" in selection.adopted else temperature_note(baseline.base)
+    if "temperature_drift" not in selection.adopted:
+        beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(

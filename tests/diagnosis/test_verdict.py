@@ -486,6 +486,14 @@ def test_a_fade_that_t0_and_c_of_each_temperature_hold_is_told(fall: float, told
         for v in (0.0, 100.0)
         for t, c in ((24.0, 1500.0), (57.0, (1.0 - fall) * 1500.0))
     )
-    assert temperature_note(base).endswith(told)
-    assert bool(temperature_note(base)) is bool(told)
-    assert not temperature_note(base[::2])
+    assert temperature_note(base, 0.2).endswith(told)
+    assert bool(temperature_note(base, 0.2)) is bool(told)
+    assert not temperature_note(base[::2], 0.2)
+
+
+def test_a_friction_next_to_none_does_not_fade() -> None:
+    base = tuple(
+        BaseRow(temperature_degC=t, T0_N=friction, C_Ns_per_m=1500.0, k_N_per_m=1e6)
+        for t, friction in ((24.0, 1e-6), (57.0, 0.5))
+    )
+    assert not temperature_note(base, 0.2)
