@@ -784,6 +784,17 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
 
 
 @pytest.mark.parametrize(
+    ("own", "told"),
+    [(0.00007, "noise alone gives 0.0008"), (0.0002, "noise with the zero, gain and delay of each test gives 0.0008")],
+)
+def test_the_story_says_where_the_floor_is_not_noise_alone(own: float, told: str) -> None:
+    found = diagnosis()
+    assert found.gap is not None
+    line = diagnosis_lines(found.model_copy(update={"gap": found.gap.model_copy(update={"tests_own": own})}), Control())
+    assert line[2].endswith(f"; {told}")
+
+
+@pytest.mark.parametrize(
     ("effects", "rivals", "told"),
     [
         (("gas_spring",), ("fluid_inertia",), " that it is gas_spring or fluid_inertia"),

@@ -31,6 +31,9 @@ class Gap(Frozen):
     before: float = Field(ge=0.0)
     after: float = Field(ge=0.0)
     noise_floor: float = Field(ge=0.0)
+    tests_own: float = Field(default=0.0, ge=0.0)
+    """Part of the floor that a zero, gain and delay of each test take, not noise; 0 where an earlier version wrote the
+    file."""
     standard_error: float = Field(ge=0.0)
     held_out: tuple[str, ...]
     hold_out: Literal["records", "cycles", "segments", "mixed"]

@@ -243,7 +243,7 @@ BLOCKS = 8
 def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     """Pool criterion (4) over the held-out samples, with noise floor and standard error; `after` equals `before`.
 
-    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `noise_floor`;
+    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `noise_floors`;
     standard error of the ratio over cycles or blocks
                                            Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
     """
@@ -251,30 +251,32 @@ def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     forces = np.concatenate([_by_block(j, j.prepared.record.force**2) for j in held_out])
     total = float(forces.sum())
     criterion = float(errors.sum()) / total
+    noise, own = np.sum([noise_floors(j) for j in held_out], axis=0) / total
     return Gap(
         before=criterion,
         after=criterion,
-        noise_floor=min(sum(noise_floor(j) for j in held_out) / total, criterion),  # at most, but for rounding
+        noise_floor=min(float(noise + own), criterion),  # at most, but for rounding
+        tests_own=min(float(own), criterion),
         standard_error=criterion_error(errors, forces),
         held_out=split.held_out,
         hold_out=split.hold_out,
     )
 
 
-def noise_floor(check: ResidualCheck) -> float:
-    """Compute what noise and the test's own nuisances leave of one record, summed over the checked samples [N^2].
+def noise_floors(check: ResidualCheck) -> tuple[float, float]:
+    """Compute what noise, and what the test's own nuisances leave of one record, summed over the checked samples [N^2].
 
     The nuisances count with what they take away, at most: near a jump they move the residual without making it smaller.
     Noise is the scatter between cycles or about a smooth residual, at most what the nuisances leave. So noise never
     exceeds the gap that it is part of.
 
-    Equation: sum min(s^2, mean c^2) + min(sum n^2, sum r^2 - sum c^2), c = r - n, n the nuisances
+    Equation: sum min(s^2, mean c^2),  min(sum n^2, sum r^2 - sum c^2),  c = r - n, n the nuisances
     """
     residual, cleared = check.residual[check.wanted], check.cleared[check.wanted]
     nuisances = check.nuisances[check.wanted]
     before, after = float(residual @ residual), float(cleared @ cleared)
     taken = min(max(before - after, 0.0), float(nuisances @ nuisances))
-    return min(check.variance * residual.size, after, before) + taken
+    return min(check.variance * residual.size, after, before), taken
 
 
 def _by_block(check: ResidualCheck, values: Array) -> Array:

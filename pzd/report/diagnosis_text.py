@@ -10,6 +10,7 @@ from pzd.schema.errors import counted
 if TYPE_CHECKING:
     from pzd.artefacts import (
         Diagnosis,
+        Gap,
         HeldOutTest,
         HeldOutVoltage,
         Hypotheses,
@@ -39,6 +40,10 @@ _MOST_SHAPES = 2
 """How many shapes of the residual force, each by itself."""
 _LEAST_SHARE = 0.01
 """Share of the gap from which an effect stands in the headline: in whole percent less is nothing."""
+
+_LEAST_OWN = 0.1
+"""Share of the noise floor that the tests' own zero, gain and delay take from which they stand beside the noise: in
+r.m.s., as the headline has it, less is a twentieth."""
 
 
 def _number(value: float | None, unit: str = "") -> str:
@@ -130,8 +135,14 @@ def _gap(diagnosis: Diagnosis) -> str:
     )
     return (
         f"gap on what no fit has seen ({held_out}): W_s {_number(gap.before)} before, {_number(gap.after)} after"
-        f"{share}; noise alone gives {_number(gap.noise_floor)}"
+        f"{share}; {noise_named(gap)} gives {_number(gap.noise_floor)}"
     )
+
+
+def noise_named(gap: Gap) -> str:
+    """Return what the noise floor of a gap stands for: noise, and what tests do by themselves where that is visible."""
+    own = gap.tests_own > _LEAST_OWN * gap.noise_floor
+    return "noise with the zero, gain and delay of each test" if own else "noise alone"
 
 
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:

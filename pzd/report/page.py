@@ -33,6 +33,7 @@ from pzd.report.blocks import (
 )
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
+from pzd.report.diagnosis_text import noise_named
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, encoded, pictures, styled
 from pzd.report.explorer import Explorer, policy, scripts
 from pzd.report.explorer import explorer as explorer_of
@@ -121,7 +122,7 @@ def _gap(gap: Gap | None) -> str:
         return "The gap could not be measured."
     before, after = number(gap.before), number(gap.after)
     course = f"stays {before}" if gap.after == gap.before else f"goes from {before} to {after}"
-    return f"The gap W_s on held-out data {course}; noise alone is {number(gap.noise_floor)}."
+    return f"The gap W_s on held-out data {course}; {noise_named(gap)} is {number(gap.noise_floor)}."
 
 
 def _next(context: ReportContext) -> Card:
@@ -236,11 +237,12 @@ def answer(context: ReportContext) -> str:
         text = verdict(context).removesuffix(".")
     if gap is None:
         return f"{text}."
-    before, after, noise = (percent(math.sqrt(w)) for w in (gap.before, gap.after, gap.noise_floor))
+    before, after, least = (percent(math.sqrt(w)) for w in (gap.before, gap.after, gap.noise_floor))
+    noise = noise_named(gap)
     on = "on tests that no fit has seen" if gap.hold_out == "records" else "on data that no fit has seen"
     if not context.damper.extended or gap.after == gap.before:
-        return f"{text}: its error {on} is {before} of the force, and noise alone would leave {noise}."
-    return f"{text}: with it the error {on} falls from {before} to {after} of the force; noise alone leaves {noise}."
+        return f"{text}: its error {on} is {before} of the force, and {noise} would leave {least}."
+    return f"{text}: with it the error {on} falls from {before} to {after} of the force; {noise} leaves {least}."
 
 
 def told(context: ReportContext) -> tuple[str, ...]:

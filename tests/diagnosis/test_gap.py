@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -99,6 +100,20 @@ def test_what_the_model_misses_is_not_reported_as_noise(rng: np.random.Generator
     gap = held_out_criterion([judged], NOBODY)
     # What remains is the offset that the test may have of its own, 3.5 times 0.5 % of its peak: a hundredth of 300 N.
     assert gap.noise_floor < 0.05 * gap.after
+
+
+@pytest.mark.parametrize("gain", [0.995, 1.005, 1.02])
+def test_what_a_gain_of_the_test_takes_stands_beside_the_noise(rng: np.random.Generator, gain: float) -> None:
+    """Of a load cell that is off by a few per mill of a force: its square of the squares of the force."""
+    true = rigid(300.0)
+    record = sine(true, 0.0, 1.0, 0.02, rng, noise=QUIET, colour=0.0, rate=1000.0, cycles=8.0)
+    (prepared,) = prepare([replace(record, force=gain * record.force)])
+    given = predict(true, prepared, NuisanceConfig().delay_s)
+    judged = check_residual(given, prepared, np.ones(record.time.size, np.bool_), NuisanceConfig())
+    gap = held_out_criterion([judged], NOBODY)
+    assert gap.tests_own == pytest.approx((1.0 - 1.0 / gain) ** 2, rel=0.05)
+    noise = QUIET * np.max(np.abs(record.force))
+    assert gap.noise_floor - gap.tests_own == pytest.approx(noise**2 / np.mean(record.force**2), rel=0.1)
 
 
 @pytest.mark.parametrize("rate", [200.0, 1000.0])

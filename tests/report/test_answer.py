@@ -89,7 +89,7 @@ def test_the_bars_are_errors_in_percent_of_the_force_with_the_interval_of_the_ad
         [gap.before, gap.after, gap.noise_floor, 0.0009, 0.004]
     )
     assert [label.get_text() for label in ax.get_yticklabels()] == [
-        "held-out tests:", "simple model", "with orifice quadratic", "noise alone",
+        "held-out tests:", "simple model", "with orifice quadratic", "noise floor",
         "seen tests:", "orifice quadratic", "shear thinning",
     ]  # fmt: skip
     held_out, candidate = (lines.get_segments()[0][:, 0] for lines in ax.collections)

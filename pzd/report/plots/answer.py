@@ -154,7 +154,7 @@ def _held_out_bars(context: ReportContext) -> list[_Bar]:
     if extended:
         name = f"with {added}" if added else "with T0, C, k anew"
         bars.append(_Bar(name, gap.after, FINAL, gap.standard_error, tuple(test.W_s for test in tests)))
-    return [*bars, _Bar("noise alone", gap.noise_floor, MEASURED, None)]
+    return [*bars, _Bar("noise floor", gap.noise_floor, MEASURED, None)]
 
 
 def _candidate_bars(context: ReportContext) -> list[_Bar]:

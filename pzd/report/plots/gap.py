@@ -26,7 +26,7 @@ def held_out_gap(context: ReportContext) -> Iterator[Panel]:
     if gap is None:
         return
     extended = context.damper.extended
-    noise, after = ("noise alone", gap.noise_floor, MEASURED), ("after", gap.after, FINAL)
+    noise, after = ("noise floor", gap.noise_floor, MEASURED), ("after", gap.after, FINAL)
     before = ("before" if extended else "simple model", gap.before, BASELINE)
     bars = [noise, after, before] if extended else [noise, before]
     last = bars[1]

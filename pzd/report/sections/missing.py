@@ -25,7 +25,7 @@ from pzd.report.blocks import (
 from pzd.report.columns import PAGE, Column, Quantity, Table
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words, effects_in_words
-from pzd.report.diagnosis_text import UNNAMED_FORCE
+from pzd.report.diagnosis_text import UNNAMED_FORCE, noise_named
 
 MIDDLE_DIGITS = 6
 """Of the middle of a test: as it is given, for the amplitude about it leaves nothing of the recorded stroke."""
@@ -54,9 +54,9 @@ def _gap(gap: Gap | None) -> str:
     if gap is None:
         return "Its error on data that no fit has seen could not be measured."
     return (
-        f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
+        f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where {noise_named(gap)} would "
         f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the residual is "
-        f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
+        f"{percent(gap.before**0.5)} of the force, and {noise_named(gap)} would be {percent(gap.noise_floor**0.5)}."
     )
 
 
@@ -118,7 +118,7 @@ def _gap_closed(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap is None:
         return ""
-    left = f"standard error {number(gap.standard_error, 2)}, noise alone {number(gap.noise_floor)}"
+    left = f"standard error {number(gap.standard_error, 2)}, {noise_named(gap)} {number(gap.noise_floor)}"
     if gap.after == gap.before:
         text = f"The model stays as it is: W_s on held-out data is {number(gap.before)} ({left})."
     else:
