@@ -11,17 +11,17 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
-from pzd.diagnosis.config import DiagnoseConfig
 from pzd.schema.model import Frozen
+from pzd.signals.measures import VISIBLE
 
 Z95 = 1.959963984540054
 """Two-sided 95 % point of the normal distribution."""
-GAP_EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
-"""Edges of the bins of the visible gap, as shares of the peak force."""
-VISIBLE_TRUTH_GAP = 0.005
-"""A hidden effect that leaves this visible gap must be found: twice the gap from which on an effect is adopted."""
-NEGLIGIBLE_GAP = DiagnoseConfig().visible
+NEGLIGIBLE_GAP = VISIBLE
 """A smaller gap counts as nothing missing."""
+VISIBLE_TRUTH_GAP = 2.0 * VISIBLE
+"""A hidden effect that leaves this visible gap must be found: twice the gap from which on an effect is adopted."""
+GAP_EDGES = (0.0, NEGLIGIBLE_GAP, VISIBLE_TRUTH_GAP, 2.0 * VISIBLE_TRUTH_GAP, 4.0 * VISIBLE_TRUTH_GAP, math.inf)
+"""Edges of the bins of the visible gap, as shares of the peak force."""
 LOW_NOISE = 0.01
 """Noise up to this share of the peak is low."""
 

@@ -13,15 +13,11 @@ from pzd.blind.hide import gap_after_refit
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.thresholds import TRIVIAL_SIZE
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import Control
 from pzd.schema.validate import read_json, write_json
 from pzd.signals.nuisance import NuisanceConfig
-
-SMALL_OFFSET = 0.01
-"""A preload_offset below this share of the softest record's peak counts as nothing missing."""
-SMALL_DELAY = 1e-3
-"""So does a sensor_delay shorter than this [s]."""
 
 _OF_THE_TRUTH = {
     *("id", "kind", "campaign", "one_frequency", "described_by", "visible_gap", "gap_given_other"),
@@ -108,7 +104,8 @@ def counted_effects(truth: Truth) -> tuple[str, ...]:
 
 def _least_that_counts(truth: Truth) -> dict[tuple[str, str], float]:
     """Return by effect and parameter the size from which on an effect counts."""
-    return {("preload_offset", "F_0"): SMALL_OFFSET * truth.lowest_peak_N, ("sensor_delay", "tau"): SMALL_DELAY}
+    unit = {"F_0": truth.lowest_peak_N}
+    return {(effect, name): size * unit.get(name, 1.0) for (effect, name), size in TRIVIAL_SIZE.items()}
 
 
 def told_apart(truth: Truth, noise_free: NoiseFree, rivals: Sequence[str]) -> bool:
@@ -128,7 +125,8 @@ def told_apart(truth: Truth, noise_free: NoiseFree, rivals: Sequence[str]) -> bo
     rivals : effects that the diagnosis names; one whose every size counts is always told apart
     """
     tests, limit, prior = len(noise_free), DiagnoseConfig().rival_bic, NuisanceConfig()
-    own = {"preload_offset": SMALL_OFFSET / prior.offset, "sensor_delay": SMALL_DELAY / prior.delay_s}
+    priors = {"preload_offset": prior.offset, "sensor_delay": prior.delay_s}
+    own = {effect: size / priors[effect] for (effect, _), size in TRIVIAL_SIZE.items() if effect in priors}
     if any(name not in own for name in rivals):
         return True
     losses = [loss for name in rivals for loss in (*_losses(truth, noise_free, name), tests * own[name] ** 2)]

@@ -171,10 +171,11 @@ def _selection(cases: Sequence[Scored]) -> Iterator[Line]:
         yield rate_line(about, "right name", mine, rates.right, targets[0])
         yield rate_line(about, "wrong name", mine, rates.wrong_name, targets[1])
         yield rate_line(about, "truth among effects and rivals", mine, rates.truth_among, targets[2])
-    faint = [c for c in several if 0.0025 <= c.visible_gap < 0.005]
+    faint = [c for c in several if rates.NEGLIGIBLE_GAP <= c.visible_gap < rates.VISIBLE_TRUTH_GAP]
+    between = f"gap {100.0 * rates.NEGLIGIBLE_GAP:g}-{100.0 * rates.VISIBLE_TRUTH_GAP:g} %"
     with_truth = "right, or ambiguous with the truth"
-    yield rate_line("gap 0.25-0.5 %", with_truth, faint, _right_or_ambiguous, ">= 60 %")
-    yield rate_line("gap 0.25-0.5 %", "wrong name", faint, rates.wrong_name, "<= 3 %")
+    yield rate_line(between, with_truth, faint, _right_or_ambiguous, ">= 60 %")
+    yield rate_line(between, "wrong name", faint, rates.wrong_name, "<= 3 %")
     alone = [c for c in single if c.one_frequency and rates.visible(c)]
     yield rate_line("one frequency, visible", "wrong name", alone, rates.wrong_name, "<= 2 %")
     twins = [c for c in alone if set(c.truth) <= TWINS]

@@ -7,6 +7,7 @@ from pydantic import Field, field_validator, model_validator
 from pzd.damper.effect import ELEMENT
 from pzd.damper.effects import library
 from pzd.schema.model import Frozen, nearest
+from pzd.signals.measures import SIGNIFICANCE, VISIBLE
 from pzd.signals.nuisance import NuisanceConfig
 
 
@@ -62,9 +63,9 @@ def _rising_limits(limits: tuple[float, float]) -> tuple[float, float]:
 class DiagnoseConfig(Frozen):
     """When simulation and measurement count as disagreeing, and when an effect is adopted."""
 
-    significance: float = Field(default=1e-3, gt=0.0, lt=1.0)
+    significance: float = Field(default=SIGNIFICANCE, gt=0.0, lt=1.0)
     """A gap is believed when noise alone would show it less often than this."""
-    visible: float = Field(default=0.0025, ge=0.0, le=0.1)
+    visible: float = Field(default=VISIBLE, ge=0.0, le=0.1)
     """A gap smaller than this share of the peak force (r.m.s.) counts as nothing missing; an effect that moves the
     force by less is not adopted."""
     negligible: float = Field(default=0.001, ge=0.0, le=0.1)

@@ -14,7 +14,7 @@ from pzd.artefacts import Gap, Region
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.data import PreparedRecord, Split
 from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples, drawn_calm, unresolved_turns
-from pzd.record import Array, Mask, Record
+from pzd.record import CONSTANT_SHARE, Array, Mask, Record
 from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
 from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
@@ -406,7 +406,7 @@ def _labels(
 def _voltages(voltage: Array, unit: str) -> Labels:
     """Label voltages to three figures; a moving one in fifths of its range."""
     span = float(np.ptp(voltage))
-    if span <= 0.02 * float(np.max(np.abs(voltage))):
+    if span <= CONSTANT_SHARE * float(np.max(np.abs(voltage))):
         return np.full(voltage.size, f"{float(np.median(voltage)):.3g} {unit}")
     return _bands(voltage, _rounded(voltage.min() + span * np.array([0.2, 0.4, 0.6, 0.8])), "moving control", unit)
 

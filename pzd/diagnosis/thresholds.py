@@ -9,12 +9,10 @@ case is known to depend on; `make sensitivity` prints what halving and doubling 
 
 from __future__ import annotations
 
+from pzd.signals.measures import VISIBLE
+
 # --- Which effects are tried, and how far each is searched (search/candidates.py)
 
-MOVING_VOLTAGE = 0.02
-"""Share of the rig's scale that the range of a voltage in a test must exceed to count as moving.
-
-Reason: the share by which records are sorted into constant and moving, see `CONSTANT_SHARE` in `pzd/record.py`."""
 FIRST_EVALUATIONS = 6
 """Evaluations after which the candidates are compared for the first time; the better ones are searched on.
 
@@ -188,10 +186,10 @@ MORE_RESISTANCE = 0.1
 """Share by which T0 and C are raised to see whether a test shows them.
 
 Reason: a test that is pulled harder than T0 by less hardly tells it; not tuned."""
-RESISTANCE_SHOWN = 0.0025
+RESISTANCE_SHOWN = VISIBLE
 """Change of the force by that, as a share of peak (r.m.s.), from which a test shows T0 and C.
 
-Reason: the default of `visible`; a test that slips all the way changes by twenty times as much, one that does not by
+Reason: what is visible at all; a test that slips all the way changes by twenty times as much, one that does not by
 nothing."""
 
 # --- When an effect is added for its prediction alone (predictive_search.py)

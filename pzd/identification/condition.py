@@ -34,7 +34,7 @@ from pzd.identification.stiffness import OilSpring, oil_spring_alone, settle_sti
 from pzd.identification.trust import ParameterEvidence, Reservation
 from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
-from pzd.signals.measures import criterion, rms
+from pzd.signals.measures import VISIBLE, criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.segmentation import separate_tests
 
@@ -346,7 +346,7 @@ def auxiliary_is_visible(objective: Objective, fit: Fit) -> bool:
     base, _ = np.linalg.qr(few[:, :3][:, size > 0.0] / size[size > 0.0])
     beyond, _ = np.linalg.qr(few[:, 3:5] - base @ (base.T @ few[:, 3:5]))
     explained = float(np.sum((beyond.T @ few[:, 5]) ** 2)) / first
-    return bool(np.sqrt(explained) > trust.MISFIT_THRESHOLD * objective.scales[0])
+    return bool(np.sqrt(explained) > VISIBLE * objective.scales[0])
 
 
 def auxiliary_start(objective: Objective) -> Array:

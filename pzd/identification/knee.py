@@ -38,12 +38,12 @@ from pzd.identification.knee_fit import (
     without_gas,
 )
 from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
-from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
+from pzd.identification.trust import WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels
 from pzd.schema.errors import ConfigError
-from pzd.signals.measures import criterion, rms
+from pzd.signals.measures import VISIBLE, criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.segmentation import separate_tests
 
@@ -324,7 +324,7 @@ def held_out_predictions(labels: Labels, tests: KneeData, knee: KneeFit, bingham
         for i in out:
             one = tests.subset([i])
             left = [one.measured - fit.predicted(one) for fit in fits]
-            unseen = one.measured.size * (MISFIT_THRESHOLD * one.peak) ** 2
+            unseen = one.measured.size * (VISIBLE * one.peak) ** 2
             of_bingham, of_knee = ((*squared_sums(one.measured, each), unseen) for each in left)
             W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
             name = one.tests[0].record.name
@@ -380,7 +380,7 @@ def law_row(
             f"{comparison}; better in {better} of {count}, by {np.exp(mean):.3g} in the geometric mean where chance "
         )
         reason += f"makes up to {np.exp(least):.3g}"
-        reason += "" if visible or mean <= 0.0 else f", and by less than {MISFIT_THRESHOLD:.2%} of peak"
+        reason += "" if visible or mean <= 0.0 else f", and by less than {VISIBLE:.2%} of peak"
     pooled = {"W_s_bingham": bingham.criterion, "W_s_knee": knee.criterion}
     return LawRow(setting=setting, law=law, tests=count, **pooled, reason=reason)
 

@@ -20,9 +20,8 @@ from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
 from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
-from pzd.identification.trust import MISFIT_THRESHOLD
 from pzd.record import Array, Mask, Record, mid_stroke
-from pzd.signals.measures import criterion, rms
+from pzd.signals.measures import VISIBLE, criterion, rms
 
 # --- Knee curve and search coordinates ---
 
@@ -337,7 +336,7 @@ def without_gas(tests: KneeData, fit: KneeFit, term: int) -> KneeFit:
 def _knee_is_visible(tests: KneeData, has_knee: KneeFit, straight: KneeFit) -> bool:
     """Tell whether the knee reduces the residual visibly beyond a straight line."""
     gained = rms(straight.residuals) ** 2 - rms(has_knee.residuals) ** 2
-    return gained > (MISFIT_THRESHOLD * tests.peak) ** 2
+    return gained > (VISIBLE * tests.peak) ** 2
 
 
 def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:

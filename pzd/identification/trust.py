@@ -13,6 +13,7 @@ from pzd.parallel.on_disk import one_at_a_time
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
+from pzd.signals.measures import SIGNIFICANCE, VISIBLE
 from pzd.signals.noise import pure_error, repeatable_power
 from pzd.signals.nuisance import NUISANCE_LIMIT, reducing_share
 
@@ -315,11 +316,6 @@ def _noise_hides_stiffness(objective: Objective, parameters: Bingham) -> str | N
 # first, together with the change of T0, C and k that goes with it. Records whose control signal moves are not judged,
 # for a lag of the valve looks like any misfit; diagnose looks at them.
 
-SIGNIFICANCE = 1e-3
-"""Largest p-value of a lack of fit, as in diagnose."""
-MISFIT_THRESHOLD = 0.0025
-"""Least misfit that matters, r.m.s. as a share of peak force: half of the error of a load cell of class 0.5, whose own
-nonlinearity may be as large. As in diagnose."""
 ABSORPTION = 2.0
 """Force that T0, C and k absorb of a missing effect, over what is left of it: for the effects of the library up to
 about four, along the parameter that suffers most (C beside a quadratic orifice); half of that, since an interval adds
@@ -342,7 +338,7 @@ class Misfit:
     @property
     def is_large(self) -> bool:
         """Whether the misfit is so large that T0, C and k are no longer the damper's."""
-        return self.share >= MISFIT_THRESHOLD
+        return self.share >= VISIBLE
 
     @property
     def absorbed(self) -> float:

@@ -162,22 +162,29 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
         yield f"left out: {_number(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
 
 
-COUNTED_FROM_ZERO = {
-    ("end_stop", "x_e"): "to either side of",
-    ("position_damping", "x_p"): "counted from",
-    ("accumulator", "L"): "counted from",
-}
-"""Parameters that are a place, by effect: counted from `Diagnosis.zero_m`, in these words."""
+def counted_from(diagnosis: Diagnosis, effect: str, name: str, place: str) -> str:
+    """Return from which displacement a parameter is counted, as words behind it; empty where it is no place.
+
+    Parameters
+    ----------
+    diagnosis : that adopted the effect
+    effect, name : of the parameter
+    place : the displacement `Diagnosis.zero_m`, with its unit
+    """
+    from pzd.damper.effects import library
+
+    found = library().get(effect)
+    words = next((p.counted for p in found.parameters if p.name == name), "") if found else ""
+    # An end stop stands at both ends: from where it is counted is said also where that is 0.
+    return f" {words} x = {place}" if words and (diagnosis.zero_m or effect == "end_stop") else ""
 
 
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
+    zero = f"{diagnosis.zero_m:.4g} m"
     values = diagnosis.parameters.get(effect, {})
-
-    def place(name: str) -> str:
-        words = COUNTED_FROM_ZERO.get((effect, name))
-        return f" {words} x = {diagnosis.zero_m:.4g} m" if words and (diagnosis.zero_m or effect == "end_stop") else ""
-
-    return ", ".join(f"{name} = {_value(value, unit)}{place(name)}" for name, value in values.items())
+    return ", ".join(
+        f"{name} = {_value(value, unit)}{counted_from(diagnosis, effect, name, zero)}" for name, value in values.items()
+    )
 
 
 def _value(value: Value, unit: str) -> str:

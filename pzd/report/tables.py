@@ -27,7 +27,7 @@ from pzd.damper.effect import Effect
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.report.columns import TERMINAL, Beyond, Cell, Column, Difference, Quantity, Span, Table
-from pzd.report.diagnosis_text import COUNTED_FROM_ZERO
+from pzd.report.diagnosis_text import counted_from
 
 FOLD = 12
 """Longer tables of tests and conditions are folded on the page."""
@@ -310,8 +310,9 @@ def prediction(found: Prediction, control: Control) -> Table:
 
 def effect_parameters(diagnosis: Diagnosis, control: Control) -> Table:
     """Return the parameters of the adopted effects, a row for each control value where they differ by it."""
+    zero = f"{1000.0 * diagnosis.zero_m:.3g} mm"
     rows = [
-        (effect, _counted_from(diagnosis, effect, name), voltage, estimate, value.unit)
+        (effect, name + counted_from(diagnosis, effect, name, zero), voltage, estimate, value.unit)
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
         for voltage, estimate in zip(value.at_voltage_V or (None,) * len(value.estimates), value.estimates, strict=True)
@@ -326,13 +327,6 @@ def effect_parameters(diagnosis: Diagnosis, control: Control) -> Table:
         ),
         rows,
     )
-
-
-def _counted_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
-    """Return the name of a parameter, with the displacement from which it is counted where it is a place."""
-    words = COUNTED_FROM_ZERO.get((effect, name))
-    shown = words and (diagnosis.zero_m or effect == "end_stop")
-    return f"{name} {words} x = {1000.0 * diagnosis.zero_m:.3g} mm" if shown else name
 
 
 def peers(found: PeerComparison, control: Control) -> Iterator[Table]:

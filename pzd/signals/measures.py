@@ -13,6 +13,12 @@ import numpy as np
 
 from pzd.record import Array, running_median
 
+SIGNIFICANCE = 1e-3
+"""Probability by noise alone below which a misfit is believed: of a thousand plain dampers one looks so."""
+VISIBLE = 0.0025
+"""Least misfit that matters, r.m.s. as a share of peak force: half of the error of a load cell of class 0.5, whose own
+nonlinearity may be as large."""
+
 _last_clock: list[tuple[ref[Array], float]] = []
 """The last clock and its step: records are worked on one at a time, and a median is dear. Clocks are never modified."""
 

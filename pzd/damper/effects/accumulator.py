@@ -37,7 +37,16 @@ EFFECT = Effect(
     law="-F_g (1 + x/L)^-1.3",
     parameters=(
         Parameter("F_g", "N", 0.0, 0.0, 1.0e6, "static force of the gas on the rod", Search(lambda s: s.force, (0.1,))),
-        Parameter("L", "m", 0.1, 1.0e-3, 100.0, "length of rod that would fill the volume of the gas", _SEARCH),
+        Parameter(
+            "L",
+            "m",
+            0.1,
+            1.0e-3,
+            100.0,
+            "length of rod that would fill the volume of the gas",
+            _SEARCH,
+            counted="counted from",
+        ),
     ),
     same_at_every_voltage=True,
     source="polytropic gas on the area of the rod; Dixon 2007, The Shock Absorber Handbook",

@@ -28,7 +28,9 @@ EFFECT = Effect(
     law="k_e (|x| - x_e)^2 sign(x) beyond x_e",
     parameters=(
         Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop", _K_E_SEARCH),
-        Parameter("x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", _X_E_SEARCH),
+        Parameter(
+            "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", _X_E_SEARCH, counted="to either side of"
+        ),
     ),
     needs_displacement_zero=True,
     same_at_every_voltage=True,

@@ -23,7 +23,9 @@ EFFECT = Effect(
     law="c_p v exp(-((x - x_p)/b_p)^2)",
     parameters=(
         Parameter("c_p", "N s/m", 0.0, -1.0e6, 1.0e6, "damping that comes on top in the zone", _C_P_SEARCH),
-        Parameter("x_p", "m", 0.0, -10.0, 10.0, "displacement at the middle of the zone", _X_P_SEARCH),
+        Parameter(
+            "x_p", "m", 0.0, -10.0, 10.0, "displacement at the middle of the zone", _X_P_SEARCH, counted="counted from"
+        ),
         Parameter("b_p", "m", 0.02, 1.0e-4, 10.0, "half width of the zone, where 1/e of it is left", _B_P_SEARCH),
     ),
     source="position-sensitive damping by grooves in the tube; Dixon 2007, The Shock Absorber Handbook",

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
 
 from pzd.artefacts import NextTest, Rig
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
-from pzd.damper.model import BaseRow, Damper
+from pzd.damper.effects.accumulator import POLYTROPIC
+from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
     ELEMENT_COLUMNS,
@@ -26,21 +27,12 @@ from pzd.diagnosis.changes.candidates import (
     parameter_value,
     values_by_control,
 )
+from pzd.diagnosis.changes.compared_tests import BEYOND_TESTED, comparisons_of, error_in_own_tests
 from pzd.diagnosis.changes.pairs import (
-    MOST_HARMONICS,
-    AveragedTest,
     Comparison,
     averaged,
     course,
-    cycles_compared,
     has_average_cycle,
-    model_compared,
-    motion_away,
-    nearest_motion,
-    octave_mean,
-    paired,
-    stacked,
-    stacked_variance,
     unstacked,
 )
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
@@ -58,9 +50,8 @@ from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import FilesEntry, Limits, RigConfig
-from pzd.schema.errors import DataError, counted
+from pzd.schema.errors import counted
 from pzd.signals.measures import criterion, rms
-from pzd.signals.nuisance import NuisanceConfig
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
 
@@ -68,8 +59,6 @@ GAS_LENGTHS = (1.0, 100.0)
 """Shortest and longest gas column, in half strokes, whose force and stiffness change together as those of a gas do.
 
 Reason: shorter than the stroke it could not be compressed, and one of a hundred half strokes hardens by a hundredth."""
-POLYTROPIC = 1.3
-"""Exponent of the gas of an accumulator or a monotube damper (`effects/accumulator.py`)."""
 SHOWN = 0.3
 """Change of a coordinate that must be visible for a quantity to be told unchanged: a third of T0, C, k or the scale of
 an effect. What moves the force by less is not shown by the tests."""
@@ -79,16 +68,14 @@ STAND_TESTS = {
     "recorder_delay": "sine, a steel spring in the place of the damper",
 }
 """What tells a doing of the stand from one of the damper, without the damper."""
-MISSED = 0.05
+LARGE_MODEL_ERROR = 0.05
 """Share of the force (r.m.s.) that the first damper misses in its own tests from which values are its model's.
 
 Reason: a model off by a twentieth has T0 and C off by about as much, more than the intervals of a change; not tuned."""
-BEYOND_TESTED = 2.0
-"""Multiple of what a damper misses in its own tests that it may miss in others, to which it was not fitted.
-
-Reason: of three parameters fitted to a test or two, as much again is taken up by the fit."""
 GONE = 1e-3
-"""Share of an interval by which a value may differ from that of an effect that is off, and be it."""
+"""Share of an interval by which a value may differ from that of an effect that is off, and be it.
+
+Reason: far less than any interval tells; the search ends so near to a limit. Not tuned."""
 ONE_CONDITION = 2.0
 """Times what is visible that has to be left at one condition alone: its few tests differ by more than all together."""
 NOTHING = ""
@@ -147,7 +134,7 @@ def findings_between(
     before: State, after: State, diagnose: DiagnoseConfig, identify: IdentifyConfig, control: Control
 ) -> Findings:
     """Compare two states and search for what changed; see `changes_between`."""
-    known = _own_missed(before, diagnose.nuisance)
+    known = error_in_own_tests(before, diagnose.nuisance)
     comparisons = comparisons_of(before, after, identify, diagnose.nuisance, known)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
     peak, middle = max(c.peak for c in comparisons), mid_stroke(r.displacement for r in before.records)
@@ -191,166 +178,6 @@ def changes_between_rigs(
     return changes_between(first, second, diagnose, identify, control)
 
 
-# --- What is compared
-
-
-def comparisons_of(
-    before: State, after: State, identify: IdentifyConfig, nuisance: NuisanceConfig, own: Missed
-) -> tuple[Comparison, ...]:
-    """Pair the tests, and compare the others of the second state with the damper of the first.
-
-    What that damper misses of the nearest motion of the first state is taken to be missed here too, where that
-    predicts the tests of the first state from one another better than the damper alone predicts its own; the nearer
-    that motion, the less is missed.
-
-    Parameters
-    ----------
-    before, after : the states
-    identify : for what counts as one condition
-    nuisance : priors on how tests differ by themselves
-    own : what the damper misses in its own tests
-
-    Raises
-    ------
-    DataError : when none of the second state repeats
-    """
-    one, other = averaged(before.prepared), averaged(after.prepared)
-    if not other:
-        raise DataError(
-            f"{after.name}: no test repeats its motion at a constant control signal, so there is no cycle to compare; "
-            "run a sine or triangle for three cycles or more"
-        )
-    within = identify.group.voltage_V
-    if within is None:
-        within = CONSTANT_SHARE * max(before.voltage_scale, after.voltage_scale)
-    pairs = paired(one, other, within, identify.group.temperature_degC)
-    matched = {j for _, j in pairs}
-    found = [cycles_compared(before.damper, one[i], other[j]) for i, j in pairs]
-    mean = float(np.mean([t.displacement[0].real for t in one])) if one else before.damper.zero_m
-    rest = [test for j, test in enumerate(other) if j not in matched]
-    beside = [test for test in rest if _as_tested(before, test, identify)]
-    if not beside and not found:
-        beside = [test for test in rest if _in_range(before, test)]
-    carried = _carried(before.damper, one, within, nuisance) if beside else None
-    for test in beside:
-        partner = nearest_motion(test, one, within)
-        farther = np.inf if carried is None or partner is None else _farther(motion_away(partner, test), carried)
-        if carried is not None and partner is not None and farther * carried.share < BEYOND_TESTED * own.share:
-            found.append(carried.beside(replace(cycles_compared(before.damper, partner, test), before=None), farther))
-        else:
-            through = model_compared(before.damper, test, mean, _temperature(before, test))
-            found.append(own.beside(through, BEYOND_TESTED))
-    if not found:
-        raise DataError(f"{before.name}, {after.name}: no test of either state has a control signal of the other")
-    return tuple(found)
-
-
-def _as_tested(before: State, test: AveragedTest, identify: IdentifyConfig) -> bool:
-    """Whether the first state was tested at the control signal and the temperature of a test."""
-    within = identify.group.temperature_degC
-    slack = _voltage_slack(before, identify.group.voltage_V)
-
-    def near(row: BaseRow) -> bool:
-        level = None in (row.voltage_V, test.voltage) or abs((row.voltage_V or 0.0) - (test.voltage or 0.0)) <= slack
-        if row.temperature_degC is None or test.temperature is None:
-            return level
-        return level and abs(row.temperature_degC - test.temperature) <= within
-
-    return any(near(row) for row in before.damper.base)
-
-
-def _voltage_slack(before: State, given: float | None) -> float:
-    return CONSTANT_SHARE * before.voltage_scale if given is None else given
-
-
-def _in_range(before: State, test: AveragedTest) -> bool:
-    """Whether the control signal of a test lies between those of the first state."""
-    if test.voltage is None:
-        return True
-    nodes = [voltage for voltage, _ in rows_per_voltage(before.damper.base)]
-    slack = _voltage_slack(before, None)
-    return min(nodes) - slack <= test.voltage <= max(nodes) + slack
-
-
-def _temperature(before: State, test: AveragedTest) -> float | None:
-    """Return the temperature of the first state at which a test without a partner is simulated [degC]."""
-    known = [r.median_temperature() for r in before.records]
-    recorded = [t for t in known if t is not None]
-    if not recorded or test.temperature is None:
-        return test.temperature
-    return float(np.clip(test.temperature, min(recorded), max(recorded)))
-
-
-@dataclass(frozen=True, eq=False)
-class Missed:
-    """What a model misses of tests of the first state, offset, gain and delay that each has of its own left out."""
-
-    share: float
-    """Of the force (r.m.s.)."""
-    power: Array
-    """(H + 1,) mean square at every harmonic, as a share of the squared peak force, over the octave about it."""
-    away: float = 0.0
-    """Mean distance of the motions from which a test is carried over (`motion_away`); 0 of the damper alone."""
-
-    @classmethod
-    def of(cls, comparisons: Sequence[Comparison], nuisance: NuisanceConfig, away: float = 0.0) -> Missed:
-        """Return what is left of differences beyond noise and what tests differ by themselves."""
-        likelihood = Likelihood(tuple(comparisons), nuisance, 0.0)
-        residuals = [c.difference for c in comparisons]
-        scatter, _ = likelihood.best_scatter(residuals)
-        missed, force, powers = 0.0, 0.0, np.full((len(comparisons), MOST_HARMONICS + 1), np.nan)
-        for c, r, own, power in zip(
-            comparisons, residuals, likelihood.own_of_tests(residuals, scatter), powers, strict=True
-        ):
-            missed += (float((r - own) @ (r - own)) - float(np.sum(c.variance))) / c.peak**2
-            force += float(np.sum(stacked(c.reference) ** 2)) / c.peak**2
-            power[: c.rate.size] = (np.abs(unstacked(r - own)) ** 2 - c.variance[: c.rate.size]) / c.peak**2
-        known = np.nan_to_num(np.nanmean(powers[:, : max(c.rate.size for c in comparisons)], axis=0))
-        octaves = octave_mean(known)
-        octaves[0] = known[0]
-        # Of squares less those of noise some are below 0 by chance, as others are above: only their mean is held to 0.
-        share = float(np.sqrt(max(missed, 0.0) / force)) if force > 0.0 else 0.0
-        return cls(share, np.maximum(octaves, 0.0), away)
-
-    def beside(self, comparison: Comparison, times: float = 1.0) -> Comparison:
-        """Return a comparison in which a model stands for a test, and misses so many times what it misses here."""
-        power = np.zeros(comparison.rate.size)
-        size = min(power.size, self.power.size)
-        power[:size] = self.power[:size] * (times * comparison.peak) ** 2
-        return replace(comparison, missed=stacked_variance(power, comparison.counted))
-
-
-def _own_missed(state: State, nuisance: NuisanceConfig) -> Missed:
-    """Return what the damper misses in its own tests."""
-    alone = [
-        model_compared(state.damper, test, float(test.displacement[0].real), test.temperature)
-        for test in averaged(state.prepared)
-    ]
-    return Missed.of(alone, nuisance) if alone else Missed(0.0, np.zeros(1))
-
-
-def _carried(
-    damper: Damper, tests: Sequence[AveragedTest], voltage_within: float, nuisance: NuisanceConfig
-) -> Missed | None:
-    """Return what is missed of the tests of a state if a model carries each over from the nearest other one."""
-    partners = ((nearest_motion(test, tests, voltage_within), test) for test in tests)
-    pairs = [(partner, test) for partner, test in partners if partner is not None]
-    away = float(np.mean([motion_away(*pair) for pair in pairs])) if pairs else 0.0
-    if away == 0.0:
-        return None
-    return Missed.of([cycles_compared(damper, *pair) for pair in pairs], nuisance, away)
-
-
-def _farther(away: float, carried: Missed) -> float:
-    """Return how many times as much is missed of a test that is carried over so far.
-
-    Equation: sqrt(d / D), D the mean distance at which it was measured
-    Source: a linear variogram, Matheron 1963, Econ. Geol. 58, 1246: of laws with kinks what two motions differ by grows
-    so in the mean square, of smooth ones with the square of the distance, so that nearby it is not underrated
-    """
-    return float(np.sqrt(away / carried.away))
-
-
 # --- Tests that have no average cycle
 
 
@@ -359,8 +186,8 @@ def _not_averaged(state: State) -> list[PreparedRecord]:
     return [test for test in state.prepared if not has_average_cycle(test)]
 
 
-def _missed_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
-    """Return the share of the force (r.m.s.) that a damper misses in tests as they were run; None without a force."""
+def _error_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | None:
+    """Compute the error of a damper in tests as they were run, as a share of the force (r.m.s.); None without one."""
     if not tests:
         return None
     masks = [comparable_samples(test) for test in tests]
@@ -474,7 +301,7 @@ class Findings:
         return float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
 
     def _settled(self) -> tuple[Fitted, dict[str, list[Fitted]]]:
-        """Return the changes with those of the damper in the place of the stand's where something tells, and rivals."""
+        """Return the changes, a gas force in the place of a zero of the load cell where they show gas, and their rivals."""
         best = self._gas(self.best)
         rivals: dict[str, list[Fitted]] = {}
         for candidate in best.candidates:
@@ -491,7 +318,7 @@ class Findings:
         What is seen where the control signal moves alone, as a lag of the valve, changes no average cycle.
         """
         tests = [_not_averaged(state) for state in (self.before, self.after)]
-        own, other = (_missed_share(self.first.damper, each) for each in tests)
+        own, other = (_error_share(self.first.damper, each) for each in tests)
         if own is None or other is None or other <= BEYOND_TESTED * own + self.diagnose.visible:
             return None
         return (
@@ -659,7 +486,7 @@ class Findings:
     def _is_gas(self, fitted: Fitted) -> bool:
         """Whether force and stiffness beside the element changed in the proportion of a gas column.
 
-        Equation: dF_0 = - dk_g L / 1.3, L the length of the gas column
+        Equation: dF_0 = - dk_g L / n, L the length of the gas column, n the exponent of the gas
         """
         changed = {c.parameter: x * c.scale for c, x in zip(fitted.coordinates, fitted.values, strict=True)}
         if "F_0" not in changed or "k_g" not in changed or changed["k_g"] == 0.0:
@@ -909,8 +736,8 @@ class Findings:
             yield f"what is left has no name{most}"
         elif verdict == "changed" and not self.search.leaves_nothing(self.best):
             yield f"{self._left_share(difference):.0%} of the difference (r.m.s. beyond noise) has no name"
-        missed = _missed_share(self.first.damper, self.before.prepared) or 0.0
-        if listed and missed > MISSED:
+        missed = _error_share(self.first.damper, self.before.prepared) or 0.0
+        if listed and missed > LARGE_MODEL_ERROR:
             yield (
                 f"the damper of {self.before.name} misses {100.0 * missed:.2g} % of the force in its own tests: the "
                 "values are those of that model, and the intervals those of what changed in it"

@@ -58,10 +58,11 @@ def followed_over(
     DataError : when a state has no test that can be compared
     """
     first, *later = states
+    slack = first.voltage_slack(identify.group.voltage_V)
     found = [findings_between(first, state, diagnose, identify, control) for state in later]
     results = [each.changes() for each in found]
     adopted = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
-    rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes)]
+    rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes, slack)]
     judged = [_judged(row, changes.tolerance) for row in rows]
     passes = [row.pass_ for row in judged if _limits(row, changes.tolerance) is not None]
     open_ = [name for name in changes.tolerance if name not in {_quantity(row) for row in rows}]
@@ -133,12 +134,15 @@ def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candi
 
 # --- Peak force over peak velocity
 
+BEYOND = 0.01
+"""Share by which the speed of a tolerance may lie beyond those of the tests: a stand reaches a speed no better."""
 
-def _peak_forces(states: Sequence[State], changes: ChangesConfig) -> Iterator[CourseRow]:
+
+def _peak_forces(states: Sequence[State], changes: ChangesConfig, slack: float) -> Iterator[CourseRow]:
     """Yield the forces at the speeds of the tolerance, between those of the tests of each state."""
     for band in changes.peak_force:
         for side, name in ((1.0, "rebound"), (-1.0, "compression")):
-            forces = [_peak_force(state, band.velocity_m_per_s, side, band.voltage_V) for state in states]
+            forces = [_peak_force(state, band.velocity_m_per_s, side, band.voltage_V, slack) for state in states]
             values = tuple(None if force is None else force[0] for force in forces)
             low = tuple(None if force is None else force[0] - force[1] for force in forces)
             high = tuple(None if force is None else force[0] + force[1] for force in forces)
@@ -153,11 +157,22 @@ def _peak_forces(states: Sequence[State], changes: ChangesConfig) -> Iterator[Co
             )  # fmt: skip
 
 
-def _peak_force(state: State, velocity: float, side: float, voltage: float | None) -> tuple[float, float] | None:
-    """Return the force at a peak speed, linear between tests, and half its interval by noise; None beyond the tests."""
+def _peak_force(
+    state: State, velocity: float, side: float, voltage: float | None, slack: float
+) -> tuple[float, float] | None:
+    """Return the force at a peak speed, linear between tests, and half its interval by noise; None beyond the tests.
+
+    Parameters
+    ----------
+    state : whose tests are taken
+    velocity : peak speed [m/s]
+    side : 1 for rebound, -1 for compression
+    voltage : control signal of the tests [V]; None for all
+    slack : by how much that of a test may differ from it [V]
+    """
     points = []
     for test in averaged(state.prepared):
-        if voltage is not None and (test.voltage is None or abs(test.voltage - voltage) > 0.02 * state.voltage_scale):
+        if voltage is not None and (test.voltage is None or abs(test.voltage - voltage) > slack):
             continue
         v, force = test.prepared.mean_motion[1], test.prepared.folded
         at = int(np.argmax(side * v))
@@ -165,7 +180,7 @@ def _peak_force(state: State, velocity: float, side: float, voltage: float | Non
                        len(force)))  # fmt: skip
     points.sort()
     speeds = [p[0] for p in points]
-    if not points or not speeds[0] * 0.99 <= velocity <= speeds[-1] * 1.01:
+    if not points or not speeds[0] * (1.0 - BEYOND) <= velocity <= speeds[-1] * (1.0 + BEYOND):
         return None
     half = [LEVEL * p[2] / np.sqrt(p[3]) for p in points]
     return float(np.interp(velocity, speeds, [p[1] for p in points])), float(np.interp(velocity, speeds, half))

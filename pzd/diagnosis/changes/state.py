@@ -18,7 +18,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
-from pzd.record import Record, mid_stroke, voltage_scale
+from pzd.record import CONSTANT_SHARE, Record, mid_stroke, voltage_scale
 from pzd.rig.config import RigConfig
 
 SOFTEST = 0.1
@@ -51,6 +51,15 @@ class State:
     def records(self) -> list[Record]:
         """The cleaned records."""
         return [p.record for p in self.prepared]
+
+    def voltage_slack(self, given: float | None = None) -> float:
+        """Return by how much control signals of one level may differ [V].
+
+        Parameters
+        ----------
+        given : what the config says of it, `identify.group.voltage_V`; None where it says nothing
+        """
+        return CONSTANT_SHARE * self.voltage_scale if given is None else given
 
     def scales(self) -> Scales:
         """Return the magnitudes by which effect parameters are scaled."""
@@ -93,7 +102,7 @@ def diagnosed_state(
 
 def acts_at_a_place(name: str) -> bool:
     """Whether an effect acts at a place of the stroke, so that no force and stiffness make up for another zero."""
-    return name == "accumulator" or (name in library() and library()[name].needs_displacement_zero)
+    return name in library() and any(parameter.counted for parameter in library()[name].parameters)
 
 
 def about(damper: Damper, zero: float) -> Damper:

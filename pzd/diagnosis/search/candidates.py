@@ -18,7 +18,7 @@ from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.search.determination import nearly_others
-from pzd.record import Array
+from pzd.record import CONSTANT_SHARE, Array
 
 # --- Starting values, and the drop in misfit that a linearised step promises from each
 
@@ -163,7 +163,7 @@ class Candidate:
 def testable(problem: Problem, effect: Effect) -> bool:
     """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
     if effect.needs == "voltage":
-        span = thresholds.MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
+        span = CONSTANT_SHARE * (problem.scales.voltage or np.inf)
         return any(o.motion.voltage is not None and np.ptp(o.motion.voltage) > span for o in problem.observations)
     if effect.needs == "temperature":
         by_row: dict[int, list[float]] = {}

@@ -92,7 +92,7 @@ LEAST_RECORDS = 1.0 / 3.0
 
 
 def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[ReferenceFit, Finding | None]:
-    """Fit a low-pass of the force behind the element; of itself that turns within a sample, or an oil spring's travel.
+    """Fit a low-pass of the force behind the element, which turns within a sample or over the travel of an oil spring.
 
     Equation: F = H(s) (F_0 + k f(T0/k, C/k) + c_1 x + c_2 a), H Butterworth's     Source: least squares
 

@@ -25,7 +25,8 @@ from states import (
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import candidates
-from pzd.diagnosis.changes.comparison import Findings, Missed, changes_between, comparisons_of, findings_between
+from pzd.diagnosis.changes.compared_tests import ModelError, comparisons_of
+from pzd.diagnosis.changes.comparison import Findings, changes_between, findings_between
 from pzd.diagnosis.changes.regression import Fitted
 from pzd.diagnosis.changes.selection import Search, _scaled
 from pzd.diagnosis.changes.uncertainty import Uncertainty
@@ -283,7 +284,7 @@ def carried(draw: np.random.Generator, motions: tuple[tuple[float, float], ...])
     """Mean square that is missed of the first harmonic of motions that were not run before, in squared peaks."""
     damper = drawn_damper(draw, (0.0,))
     before, after = state_of("new", outside(damper, draw, MOTIONS)), state_of("aged", outside(damper, draw, motions))
-    never = Missed(np.inf, np.zeros(1))  # the damper alone says nothing
+    never = ModelError(np.inf, np.zeros(1))  # the damper alone says nothing
     compared = comparisons_of(before, after, IdentifyConfig(), DiagnoseConfig().nuisance, never)
     return [float(c.missed[1]) / c.peak**2 for c in compared if c.missed is not None]
 
