@@ -216,11 +216,13 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
 
 def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     """Yield names and values of the numbers of a run that are compared with those of others."""
+    from pzd.quantities import BINGHAM
     from pzd.report import tables
     from pzd.report.columns import TERMINAL
 
+    names = {"W_s", *(quantity.column for quantity in BINGHAM)}
     parameters = tables.parameters(run.parameters, run.control)
-    compared = [column for column in parameters.columns if column.name in ("T0_N", "C_Ns_per_m", "k_N_per_m", "W_s")]
+    compared = [column for column in parameters.columns if column.name in names]
     for row in run.parameters:
         for column in compared:
             head = column.heading(TERMINAL)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pzd.artefacts import AuxiliaryRow, Characteristics, Identified, Knees, ParameterRow, Rig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
-from pzd.quantities import TEMPERATURE, Control
+from pzd.quantities import BINGHAM, TEMPERATURE, Control
 from pzd.record import Condition, Labels, Record, conditions, distinct, merged_voltages
 from pzd.schema.errors import ConfigError, DataError, counted, supported
 from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
@@ -196,7 +196,7 @@ def _parameter_text(row: ParameterRow) -> str:
     voltage = None if row.voltage_V is None else f"{row.voltage_V:.4g}"
     temperature = None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC"
     place = ", ".join(part for part in (row.setting, voltage, temperature) if part)
-    T0, C, k = (_supported(row, name) for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
+    T0, C, k = (_supported(row, quantity.column) for quantity in BINGHAM)
     return f"{place or 'all records'}: T0 = {T0} N, C = {C} N s/m, k = {k} N/m, W_s = {row.W_s:.3g}, {row.status}"
 
 

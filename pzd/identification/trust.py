@@ -10,6 +10,7 @@ import numpy as np
 from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective, ends_at_a_step
 from pzd.identification.prepared_record import FittedRecord
 from pzd.parallel.on_disk import one_at_a_time
+from pzd.quantities import BINGHAM
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
@@ -128,7 +129,7 @@ def _percent(share: float) -> str:
 
 # --- Evidence on each parameter ---
 
-PARAMETER_NAMES = ("T0", "C", "k")
+PARAMETER_NAMES = tuple(quantity.symbol for quantity in BINGHAM)
 TARE = 0.3
 """Mean force, as a share of the r.m.s., above which a tare of the load cell is suggested."""
 

@@ -24,6 +24,7 @@ from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
 from pzd.diagnosis.changes.state import about, acts_at_a_place
 from pzd.diagnosis.fit.problem import BOUND
+from pzd.quantities import BINGHAM
 from pzd.record import Array, Complex
 
 Of = Literal["damper", "stand"]
@@ -63,8 +64,8 @@ SHARE = "share"
 LEAST_WARMING = 0.5
 """Difference of the mean temperatures [K] from which temperature is a candidate: the resolution of a thermocouple."""
 
-ELEMENT_UNITS = {"T0": "N", "C": "N s/m", "k": "N/m"}
-ELEMENT_COLUMNS = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
+ELEMENT_UNITS = {quantity.symbol: quantity.unit for quantity in BINGHAM}
+ELEMENT_COLUMNS = {quantity.symbol: quantity.column for quantity in BINGHAM}
 STAND: Mapping[str, tuple[str, float]] = {
     "load_cell_zero": ("N", np.inf),
     "load_cell_gain": ("-", LARGEST_GAIN),
