@@ -61,7 +61,8 @@ BINGHAM = (FRICTION, DAMPING, STIFFNESS)
 """The parameters of the Bingham element, in the order in which they are fitted and written."""
 
 CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
-"""The canonical columns of a rig record, in the order in which they are written."""
+"""The canonical columns of a rig record, in the order in which they are written, named as the fields of `Record`; the
+first five are in every file."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
 from pzd.parallel.on_disk import OnDisk
 from pzd.parallel.processes import parallel_each, parallel_map
-from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.quantities import CHANNELS, PRESSURE, TIME, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.errors import DataError, at
@@ -21,8 +21,6 @@ from pzd.schema.validate import read_json_list, write_json
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
-CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
-"""Columns of a record's file, named as the fields of `Record`; the first five are in every one."""
 
 
 class Finding(Frozen):
