@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
-from pzd.artefacts.diagnosis import Support
+from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import rows_per_voltage
@@ -36,8 +35,6 @@ from pzd.record import Array
 from pzd.schema.errors import counted
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
-
-Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Literal, cast
 import numpy as np
 
 from pzd.artefacts import NextTest, Rig
-from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
+from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
@@ -61,8 +61,6 @@ from pzd.rig.config import FilesEntry, Limits, RigConfig
 from pzd.schema.errors import DataError, counted
 from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
-
-Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
 
 GAS_LENGTHS = (1.0, 100.0)
 """Shortest and longest gas column, in half strokes, whose force and stiffness change together as those of a gas do.
