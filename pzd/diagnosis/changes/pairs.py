@@ -21,7 +21,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import simulated_record
-from pzd.record import CONSTANT_SHARE, Array, Complex, Mask, Record
+from pzd.record import CONSTANT_SHARE, MAD_TO_SIGMA, Array, Complex, Mask, Record
 from pzd.signals.harmonics import mains_harmonics
 from pzd.signals.noise import PureError, pure_error
 
@@ -371,7 +371,7 @@ def jump_columns(test: AveragedTest, counted: Mask, shift: float) -> Array:
     """
     cycle = test.prepared.folded.mean(axis=0)
     steps = np.roll(cycle, -1) - cycle
-    usual = 1.4826 * float(np.median(np.abs(np.roll(steps, -1) - steps)))
+    usual = MAD_TO_SIGMA * float(np.median(np.abs(np.roll(steps, -1) - steps)))
     jump = np.abs(np.roll(steps, -1) - steps) > JUMP * usual
     jumps = np.where(jump | np.roll(jump, 1), steps, 0.0) / np.sqrt(12.0)
     spectra = (force_spectrum(np.where(sign * jumps > 0.0, jumps, 0.0), counted) for sign in (1.0, -1.0))
