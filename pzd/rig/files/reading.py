@@ -404,7 +404,11 @@ def _digest(test: RawRecord, alone: DamperAlone) -> bytes:
 
 
 def _label(test: RawRecord) -> tuple[str | None, tuple[float, ...]]:
-    """Return the setting and the medians of the control signal and the temperature; NaN where there is none."""
+    """Return the setting and the medians of the control signal and the temperature; -273.15 where there is none.
+
+    Reason: labels are compared, and NaN does not equal itself; no test is run at absolute zero, nor with a control
+    signal set to that number.
+    """
     channels = (test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE))
     return test.setting, tuple(-273.15 if values is None else float(np.median(values)) for values in channels)
 
