@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from pzd.artefacts import NextTest, Rig
+from pzd.artefacts import NextTest
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
@@ -45,7 +45,7 @@ from pzd.diagnosis.changes.pairs import (
 )
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
-from pzd.diagnosis.changes.state import State, about, diagnosed_state
+from pzd.diagnosis.changes.state import State, about
 from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
@@ -54,10 +54,9 @@ from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.diagnosis.verdict import knee_note
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
-from pzd.rig.config import FilesEntry, Limits, RigConfig
+from pzd.rig.config import Limits
 from pzd.schema.errors import DataError, counted
 from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
@@ -157,36 +156,6 @@ def findings_between(
     )
     best = search.run()
     return Findings(first, search, best, diagnose, control, before, after, identify.law)
-
-
-def changes_between_rigs(
-    before: Rig,
-    after: Rig,
-    diagnose: DiagnoseConfig,
-    identify: IdentifyConfig,
-    control: Control,
-    settings: tuple[str | None, str | None] = (None, None),
-    names: tuple[str, str] = ("before", "after"),
-    jobs: int = 1,
-) -> Compared:
-    """Identify two states from their records, diagnose the first, and find what changed.
-
-    Parameters
-    ----------
-    before, after : records of both states
-    diagnose, identify : blocks of the config
-    control : the control signal
-    settings : of the rigs, the one that each state is
-    names : of the states
-    jobs : processes or threads that identification and diagnosis may use
-    """
-    stand = RigConfig(files=(FilesEntry(path="*"),))
-    rigs = zip(names, (before, after), settings, strict=True)
-    found = [(name, rig, run_identify(identify, rig, jobs), setting) for name, rig, setting in rigs]
-    first, second = (State.of(*each, control) for each in found)
-    _, rig, identified, setting = found[0]
-    first = diagnosed_state(first, rig, identified, setting, diagnose, identify, stand, control, jobs)
-    return changes_between(first, second, diagnose, identify, control)
 
 
 # --- What is compared
