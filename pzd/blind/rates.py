@@ -12,10 +12,9 @@ import numpy as np
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.fit.intervals import CONFIDENCE
 from pzd.schema.model import Frozen
 
-Z95 = 1.959963984540054
-"""Two-sided 95 % point of the normal distribution."""
 GAP_EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
 """Edges of the bins of the visible gap, as shares of the peak force."""
 VISIBLE_TRUTH_GAP = 0.005
@@ -57,13 +56,12 @@ class Rate:
 
         Equation: (p + z^2/2n +- z sqrt(p (1-p)/n + z^2/4n^2)) / (1 + z^2/n)      Source: Wilson 1927
         """
+        from scipy.stats import binomtest
+
         if not self.count:
             return 0.0, 1.0
-        n, p = self.count, self.hits / self.count
-        middle = p + Z95**2 / (2 * n)
-        half = Z95 * math.sqrt(p * (1.0 - p) / n + Z95**2 / (4 * n * n))
-        whole = 1.0 + Z95**2 / n
-        return max((middle - half) / whole, 0.0), min((middle + half) / whole, 1.0)
+        found = binomtest(self.hits, self.count).proportion_ci(CONFIDENCE, method="wilson")
+        return float(found.low), float(found.high)
 
 
 # --- The answer to one case; a failed diagnosis is always wrong ---
