@@ -16,7 +16,7 @@ from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 
 log = logging.getLogger(__name__)
 
-WORTH_A_PROCESS = 2_000_000
+SAMPLES_WORTH_A_PROCESS = 2_000_000
 """Fewest samples in all for which conditions and records are worked on in separate processes, which have to start."""
 
 _VOLTAGE = Control()
@@ -55,7 +55,7 @@ def identify(
     from pzd.identification.characteristics import characteristics
     from pzd.identification.strokes_and_loops import measures
 
-    jobs = jobs if sum(record.time.size for record in rig.records) > WORTH_A_PROCESS else 1
+    jobs = jobs if sum(record.time.size for record in rig.records) > SAMPLES_WORTH_A_PROCESS else 1
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
     constant, moving = conditions(distinct(rig.records), identify.group.voltage_V, identify.group.temperature_degC)

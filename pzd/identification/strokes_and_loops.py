@@ -33,7 +33,8 @@ MIDDLE_PART = (0.4, 0.6)
 STRAIGHT_PIECES = 4
 """Pieces of equal length of the straight part, whose speeds are compared."""
 CONSTANT_SPEED = 0.03
-"""Largest relative deviation of a constant speed from its mean; that of a sine changes by 5 % over these pieces."""
+"""Largest relative deviation of a constant speed from its mean; that of a sine changes by 5 % over these pieces, and
+stays within it for a sixth of its cycle."""
 SINUSOIDAL = 0.03
 """Largest r.m.s. deviation of a sine from half a cosine, as a share of stroke: a crank has 0.02, a triangle 0.07."""
 AROUND_PEAK = 0.7
@@ -293,8 +294,6 @@ def _cycle_from_lowest(time: Array, displacement: Array, velocity: Array, force:
 
 SPEED_WINDOWS = 16
 """Windows in a cycle in which a constant speed is sought: long against noise, short against a stroke."""
-LOOP_CONSTANT_SPEED = 0.03
-"""Largest relative deviation of a constant speed; a sine stays within it for a sixth of its cycle."""
 CONSTANT_SPEED_SHARE = 0.5
 """Least share of the cycle in which a test of constant speed keeps it."""
 
@@ -401,7 +400,7 @@ def peak_speed(loop: Loop) -> float:
         return largest
     apart = np.abs(np.roll(loop.displacement, -width) - loop.displacement) / (width * loop.step)
     level = float(np.median(apart))
-    constant = np.count_nonzero(np.abs(apart - level) <= LOOP_CONSTANT_SPEED * level) >= CONSTANT_SPEED_SHARE * points
+    constant = np.count_nonzero(np.abs(apart - level) <= CONSTANT_SPEED * level) >= CONSTANT_SPEED_SHARE * points
     return level if constant else largest
 
 
