@@ -142,7 +142,7 @@ def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
 
 # --- Looking up the tests or conditions that a few stated numbers mean ---
 
-SAME_MOTION = 0.05
+SAME_SET_VALUE = 0.05
 """Frequencies, amplitudes and speeds that differ by less, relative, are the same: stands reach what they are set to
 within a few per cent, and nobody tests at two values closer than that."""
 
@@ -173,8 +173,8 @@ ANY = Conditions()
 
 
 def same_motion(a: float, b: float) -> bool:
-    """Return whether two frequencies, amplitudes or speeds are the same, within `SAME_MOTION` of the larger."""
-    return abs(a - b) <= SAME_MOTION * max(abs(a), abs(b))
+    """Return whether two frequencies, amplitudes or speeds are the same, within `SAME_SET_VALUE` of the larger."""
+    return abs(a - b) <= SAME_SET_VALUE * max(abs(a), abs(b))
 
 
 def slowest_test_force(found: Characteristics, row: GasAndFrictionRow) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from pzd.artefacts import MeasureRow
 from pzd.artefacts.identified import Kind
-from pzd.artefacts.rig import SAME_MOTION, same_motion
+from pzd.artefacts.rig import SAME_SET_VALUE, same_motion
 from pzd.identification.prepared_record import warm_up
 from pzd.parallel.processes import parallel_map
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
@@ -438,8 +438,8 @@ class _SameTests:
     def to(self, row: MeasureRow) -> list[MeasureRow]:
         """Return the periodic tests that are the same but for the voltage, in the order of the rows."""
         speed, of_setting = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
-        low = bisect_left(of_setting, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
-        high = bisect_right(of_setting, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        low = bisect_left(of_setting, speed * (1.0 - 2.0 * SAME_SET_VALUE), key=lambda entry: entry[0])
+        high = bisect_right(of_setting, speed * (1.0 + 2.0 * SAME_SET_VALUE), key=lambda entry: entry[0])
         return [r for _, _, r in sorted(of_setting[low:high], key=lambda entry: entry[1]) if _same_test(r, row)]
 
 

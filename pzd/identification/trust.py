@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective, ends_at_a_step
+from pzd.identification.bingham_fit import AT_ZERO, Bingham, Objective, ends_at_a_step
 from pzd.identification.prepared_record import FittedRecord
 from pzd.parallel.on_disk import one_at_a_time
 from pzd.quantities import BINGHAM
@@ -287,7 +287,7 @@ def not_converged(objective: Objective, parameters: Bingham, cosines: Array, *, 
     whole : whether T0, C and k are all that was fitted to these data
     """
     x = objective.coordinates.to_search(*parameters)
-    moving = [c > CONVERGENCE_COSINE and at > AT_LIMIT for c, at in zip(cosines.tolist(), x.tolist(), strict=True)]
+    moving = [c > CONVERGENCE_COSINE and at > AT_ZERO for c, at in zip(cosines.tolist(), x.tolist(), strict=True)]
     return moving if any(moving) and not (whole and ends_at_a_step(objective, parameters)) else [False] * len(moving)
 
 

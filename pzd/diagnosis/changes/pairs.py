@@ -41,7 +41,7 @@ SAME_FREQUENCY = 0.02
 """Relative difference of two frequencies that count as one.
 
 Reason: the force of a viscous damper then differs by as much, which the model carries to a tenth of it."""
-SAME_MOTION = 0.1
+SAME_CYCLE = 0.1
 """R.m.s. difference of two displacements that count as one motion, as a share of the larger.
 
 Reason: what the model misses, often a tenth of the force, then counts for a hundredth of it."""
@@ -198,11 +198,11 @@ def paired(
             if abs(one.frequency - other.frequency) > SAME_FREQUENCY * one.frequency:
                 continue
             distance = motion_distance(one, other)
-            if distance <= SAME_MOTION:
+            if distance <= SAME_CYCLE:
                 warmer = 0.0
                 if one.temperature is not None and other.temperature is not None:
                     warmer = abs(one.temperature - other.temperature) / max(temperature_within, 1e-9)
-                cost[i, j] = distance / SAME_MOTION + warmer
+                cost[i, j] = distance / SAME_CYCLE + warmer
     rows, columns = linear_sum_assignment(cost)
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NO_TEST]
 
