@@ -168,7 +168,16 @@ MID_STROKE_SPEED = 0.1
 
 
 def strokes_of(time: Array, displacement: Array, force: Array) -> list[Stroke]:
-    """Return the whole strokes between reversals, the ends of the record among them."""
+    """Return the whole strokes between reversals, the ends of the record among them.
+
+    Parameters
+    ----------
+    time, displacement, force : (n,) of one record [s], [m], [N]
+
+    Returns
+    -------
+    those of `SHORT_STROKE` of the record's and more, in their order
+    """
     turns = sorted({0, *reversals(displacement), displacement.size - 1})
     found = [
         Stroke(time[first : last + 1], displacement[first : last + 1], force[first : last + 1])
@@ -377,7 +386,13 @@ def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
 
 
 def force_at_rest(velocity: Array, force: Array, closed: bool) -> float:
-    """Compute the mean of abs(F) where the speed passes through zero [N]; 0 where it never does."""
+    """Compute the mean of abs(F) where the speed passes through zero [N]; 0 where it never does.
+
+    Parameters
+    ----------
+    velocity, force : (n,) [m/s], [N]
+    closed : whether the last sample is followed by the first, as in an average cycle
+    """
     if closed:
         velocity, force = np.append(velocity, velocity[0]), np.append(force, force[0])
     before = np.flatnonzero((velocity[:-1] >= 0.0) != (velocity[1:] >= 0.0))
