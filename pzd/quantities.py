@@ -57,8 +57,12 @@ FRICTION = Quantity("T0", "T0", "N", "dry friction force of the Bingham element"
 DAMPING = Quantity("C", "C", "N s/m", "damping coefficient of the Bingham element")
 STIFFNESS = Quantity("k", "k", "N/m", "stiffness of the oil spring of the Bingham element")
 
+BINGHAM = (FRICTION, DAMPING, STIFFNESS)
+"""The parameters of the Bingham element, in the order in which they are fitted and written."""
+
 CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
-"""The canonical columns of a rig record, in the order in which they are written."""
+"""The canonical columns of a rig record, in the order in which they are written, named as the fields of `Record`; the
+first five are in every file."""
 
 
 @dataclass(frozen=True)

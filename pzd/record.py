@@ -29,6 +29,8 @@ DIFFERENT_SHARE = 0.1
 """Least difference of two voltages set on purpose, as a share of the scale: a supply scatters by a few hundredths."""
 SAME_TEMPERATURE = 2.0
 """Largest spread of temperature in one condition [K], unless the config says otherwise."""
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation: robust, whatever a few samples do."""
 _EQUAL_GAPS = 1e-9
 """Relative difference below which two gaps are equal but for rounding."""
 _EVEN = 1e-3
@@ -142,7 +144,7 @@ def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]
     """
     away = deviation_from_median(values) if deviation is None else deviation
     deviation = np.abs(away)
-    noise = 1.4826 * float(np.median(deviation))
+    noise = MAD_TO_SIGMA * float(np.median(deviation))
     # Of the median, for glitches that come often would themselves be the steepest steps.
     steepest = float(np.percentile(np.abs(np.diff(values - away)), 99.0)) if values.size > 1 else 0.0
     low, high = np.percentile(values, (0.5, 99.5))
@@ -302,7 +304,7 @@ def _median_level(values: Array, finest: float) -> float:
     unrounded where most samples are equal
     """
     middle = float(np.median(values))
-    step = min(1.4826 * float(np.median(np.abs(values - middle))), 0.1 * finest)
+    step = min(MAD_TO_SIGMA * float(np.median(np.abs(values - middle))), 0.1 * finest)
     return round(middle, -math.floor(math.log10(step))) + 0.0 if step > 0.0 else middle
 
 

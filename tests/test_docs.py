@@ -208,6 +208,27 @@ def test_headings_that_a_page_links_to_exist(name: str) -> None:
     assert [f"{target}#{anchor}" for target, anchor in links if anchor not in headings(texts[target])] == []
 
 
+def told_of_studies() -> dict[str, str]:
+    """What tells how the studies are run: their docstrings and the Makefile, by path."""
+    studies = sorted((ROOT / "tests" / "studies").glob("*.py"))
+    told = {path.relative_to(ROOT).as_posix(): ast.get_docstring(tree(path)) or "" for path in studies}
+    return {**told, "Makefile": page("Makefile")}
+
+
+def missing_of_tests(text: str) -> list[str]:
+    """The paths below `tests/` that a text names and that do not exist."""
+    named = {path.rstrip("./") for path in re.findall(r"(?<![\w./-])tests/[\w./-]*", text)}
+    return [path for path in sorted(named) if not (ROOT / path).exists()]
+
+
+def test_every_path_of_the_tests_that_a_study_or_the_makefile_names_exists() -> None:
+    told = told_of_studies()
+    assert any("python tests/studies/" in text for text in told.values())
+    assert {name: missing for name, text in told.items() if (missing := missing_of_tests(text))} == {}
+    line = "PYTHONPATH=.:tests/identify python tests/studies/none.py, see tests/fit/"
+    assert missing_of_tests(line) == ["tests/identify", "tests/studies/none.py"]
+
+
 # ---------------------------------------------------------------- the docstrings
 
 

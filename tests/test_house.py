@@ -6,12 +6,13 @@ Beside them: every exception from a rule says why, and every random draw of a te
 from __future__ import annotations
 
 import ast
-import importlib
 import io
-import pkgutil
+import os
 import re
+import subprocess
+import sys
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -179,10 +180,52 @@ def test_no_module_is_called_as_a_function_of_the_front_door_or_says_nothing() -
     assert [name for name in modules(PACKAGE) if SAYS_NOTHING & set(name.split("."))] == []
 
 
+IMPORTED_ALONE = """
+import importlib, os, sys, traceback
+
+for name in ("matplotlib.figure", "numba", "pandas", "pydantic", "scipy.signal", "scipy.stats", "typer"):
+    importlib.import_module(name)  # once, for these take most of the time
+assert not any(name.split(".")[0] == "pzd" for name in sys.modules)
+for name in sys.argv[1:]:
+    child = os.fork()
+    if child == 0:
+        try:
+            importlib.import_module(name)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+        os._exit(0)
+    if os.waitpid(child, 0)[1]:
+        print(name)
+"""
+"""Prints which of the modules given cannot be imported, each in a process that has imported nothing of pzd."""
+
+
+def alone(names: Iterable[str], path: Path) -> list[str]:
+    """The modules that cannot be imported first, from the packages below a path."""
+    environment = {**os.environ, "PYTHONPATH": str(path)}
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTED_ALONE, *names], env=environment, stdout=subprocess.PIPE, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.ci
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a fresh interpreter for each module would take ten minutes")
 def test_every_module_can_be_imported_by_itself() -> None:
-    for found in pkgutil.walk_packages(pzd.__path__, "pzd."):
-        if not found.name.endswith("__main__"):
-            importlib.import_module(found.name)
+    names = [name for name in modules(PACKAGE) if not name.endswith("__main__")]
+    assert alone(names, PACKAGE.parent) == []
+
+
+@pytest.mark.ci
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="as above")
+def test_a_module_that_needs_another_one_imported_before_is_found(tmp_path: Path) -> None:
+    package = tmp_path / "pair"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "first.py").write_text("from pair import second\nsaid = 1\n")
+    (package / "second.py").write_text("from pair.first import said\n")
+    assert alone(["pair.first", "pair.second"], tmp_path) == ["pair.first"]
 
 
 # ---------------------------------------------------------------- exceptions and draws

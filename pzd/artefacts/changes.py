@@ -12,6 +12,9 @@ from pydantic import ConfigDict, Field
 from pzd.artefacts.diagnosis import NextTest
 from pzd.schema.model import Frozen
 
+Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
+"""Whether a damper changed, as far as its tests show; `unexplained` where the change has no name."""
+
 
 class _Keyed(Frozen):
     """Model of which some keys are words of Python, written with an underscore behind them in code."""
@@ -72,7 +75,7 @@ class Unchanged(_Keyed):
 class Changes(_Keyed):
     """What changed between two states of a damper, how sure that is, and what cannot be told apart."""
 
-    verdict: Literal["changed", "unchanged", "ambiguous", "unexplained"]
+    verdict: Verdict
     from_: str = Field(alias="from")
     to: str
     compared: Literal["cycles", "model", "both"]
@@ -122,7 +125,7 @@ def _listed(values: Numbers) -> list[float]:
 class Course(_Keyed):
     """What changed over more than two states, each against the first."""
 
-    verdict: Literal["changed", "unchanged", "ambiguous", "unexplained"]
+    verdict: Verdict
     from_: str = Field(alias="from")
     to: str
     states: tuple[str, ...]

@@ -23,6 +23,9 @@ from pzd.schema.model import Frozen
 from pzd.schema.validate import read_json, write_json
 from pzd.schema.yamlfile import read_yaml_model, write_yaml_model
 
+Verdict = Literal["named", "ambiguous", "none", "unexplained"]
+"""What a diagnosis says is missing: effects by name, one of several, nothing, or something that has no name."""
+
 
 class Gap(Frozen):
     """The gap between simulation and measurement on held-out data."""
@@ -167,7 +170,7 @@ class Support(Frozen):
 class Diagnosis(Frozen):
     """What is missing from the model, how sure that is, and what would settle it."""
 
-    verdict: Literal["named", "ambiguous", "none", "unexplained"]
+    verdict: Verdict
     reason: str
     effects: tuple[str, ...]
     confidence: float | None = Field(ge=0.0, le=1.0)

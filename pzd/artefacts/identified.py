@@ -75,6 +75,10 @@ class GasAndFrictionRow(ConditionRow):
     """`at the lowest speed`: there is only one speed, and its viscous force counts as friction."""
 
 
+RISE_SHARES = (0.63, 0.9)
+"""Shares of a change of force to which the time is given, as in data sheets."""
+
+
 class StepRow(Frozen):
     """How quickly the force followed one step of the control signal."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
 from pzd.parallel.on_disk import OnDisk
 from pzd.parallel.processes import parallel_each, parallel_map
-from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.quantities import CHANNELS, PRESSURE, TIME, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.errors import DataError, at
@@ -21,8 +21,6 @@ from pzd.schema.validate import read_json_list, write_json
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
-CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
-"""Columns of a record's file, named as the fields of `Record`; the first five are in every one."""
 
 
 class Finding(Frozen):
@@ -144,7 +142,7 @@ def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
 
 # --- Looking up the tests or conditions that a few stated numbers mean ---
 
-SAME_MOTION = 0.05
+SAME_SET_VALUE = 0.05
 """Frequencies, amplitudes and speeds that differ by less, relative, are the same: stands reach what they are set to
 within a few per cent, and nobody tests at two values closer than that."""
 
@@ -175,8 +173,8 @@ ANY = Conditions()
 
 
 def same_motion(a: float, b: float) -> bool:
-    """Return whether two frequencies, amplitudes or speeds are the same, within `SAME_MOTION` of the larger."""
-    return abs(a - b) <= SAME_MOTION * max(abs(a), abs(b))
+    """Return whether two frequencies, amplitudes or speeds are the same, within `SAME_SET_VALUE` of the larger."""
+    return abs(a - b) <= SAME_SET_VALUE * max(abs(a), abs(b))
 
 
 def slowest_test_force(found: Characteristics, row: GasAndFrictionRow) -> float:

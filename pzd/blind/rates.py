@@ -11,11 +11,10 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
+from pzd.fit.intervals import CONFIDENCE
 from pzd.schema.model import Frozen
 from pzd.signals.measures import VISIBLE
 
-Z95 = 1.959963984540054
-"""Two-sided 95 % point of the normal distribution."""
 NEGLIGIBLE_GAP = VISIBLE
 """A smaller gap counts as nothing missing."""
 VISIBLE_TRUTH_GAP = 2.0 * VISIBLE
@@ -57,13 +56,12 @@ class Rate:
 
         Equation: (p + z^2/2n +- z sqrt(p (1-p)/n + z^2/4n^2)) / (1 + z^2/n)      Source: Wilson 1927
         """
+        from scipy.stats import binomtest
+
         if not self.count:
             return 0.0, 1.0
-        n, p = self.count, self.hits / self.count
-        middle = p + Z95**2 / (2 * n)
-        half = Z95 * math.sqrt(p * (1.0 - p) / n + Z95**2 / (4 * n * n))
-        whole = 1.0 + Z95**2 / n
-        return max((middle - half) / whole, 0.0), min((middle + half) / whole, 1.0)
+        found = binomtest(self.hits, self.count).proportion_ci(CONFIDENCE, method="wilson")
+        return float(found.low), float(found.high)
 
 
 # --- The answer to one case; a failed diagnosis is always wrong ---

@@ -10,7 +10,7 @@ import typer
 
 from pzd.cli.options import CORES, Call, Json, Quiet, Verbose, on_config
 from pzd.cli.output import DONE, Output
-from pzd.report.diagnosis_text import diagnosis_lines
+from pzd.report.diagnosis_text import diagnosis_lines, shown
 from pzd.schema.errors import ConfigError, counted
 
 if TYPE_CHECKING:
@@ -27,13 +27,6 @@ IsResolved = Annotated[
     typer.Option("--resolved", help="Print every value of the config with its origin instead: line, --set, default."),
 ]
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
-
-
-def _number(value: float | None, unit: str = "") -> str:
-    """Return a number with its unit as tables of the terminal have it."""
-    from pzd.report.columns import TERMINAL  # here, since `pzd --help` needs neither tables nor numpy
-
-    return TERMINAL.amount(value, unit)
 
 
 # --- pzd check ---
@@ -95,9 +88,9 @@ def _check_plot(plot: Path | None) -> None:
 
 
 def _entry(entry: RecordEntry) -> Iterator[str]:
-    yield f"{entry.name}: {_number(entry.cycles)} cycles at {_number(entry.rate_Hz, 'Hz')}"
+    yield f"{entry.name}: {shown(entry.cycles)} cycles at {shown(entry.rate_Hz, 'Hz')}"
     for finding in entry.findings:
-        yield f"  {finding.check}: {finding.where}: {_number(finding.size)} {finding.unit}; {finding.follows}"
+        yield f"  {finding.check}: {finding.where}: {shown(finding.size)} {finding.unit}; {finding.follows}"
 
 
 def _ingested(rows: Sequence[IngestRow], record: str) -> Iterator[str]:
@@ -216,11 +209,13 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
 
 def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     """Yield names and values of the numbers of a run that are compared with those of others."""
+    from pzd.quantities import BINGHAM
     from pzd.report import tables
     from pzd.report.columns import TERMINAL
 
+    names = {"W_s", *(quantity.column for quantity in BINGHAM)}
     parameters = tables.parameters(run.parameters, run.control)
-    compared = [column for column in parameters.columns if column.name in ("T0_N", "C_Ns_per_m", "k_N_per_m", "W_s")]
+    compared = [column for column in parameters.columns if column.name in names]
     for row in run.parameters:
         for column in compared:
             head = column.heading(TERMINAL)
@@ -228,15 +223,15 @@ def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     if run.diagnosis is not None:
         yield "verdict", run.diagnosis.verdict
         yield "effects", ", ".join(run.diagnosis.effects) or "-"
-        yield "confidence", _number(run.diagnosis.confidence)
-        yield "W_s on held-out data, baseline", _number(run.diagnosis.gap.before if run.diagnosis.gap else None)
-        yield "W_s on held-out data, adopted damper", _number(run.diagnosis.gap.after if run.diagnosis.gap else None)
+        yield "confidence", shown(run.diagnosis.confidence)
+        yield "W_s on held-out data, baseline", shown(run.diagnosis.gap.before if run.diagnosis.gap else None)
+        yield "W_s on held-out data, adopted damper", shown(run.diagnosis.gap.after if run.diagnosis.gap else None)
     for ride in run.summary:
-        yield f"{ride.case}: peak |a_K| at {ride.point} [m/s2]", _number(ride.peak_abs_aK_m_per_s2)
-        yield f"{ride.case}: rms a_K at {ride.point} [m/s2]", _number(ride.rms_aK_m_per_s2)
+        yield f"{ride.case}: peak |a_K| at {ride.point} [m/s2]", shown(ride.peak_abs_aK_m_per_s2)
+        yield f"{ride.case}: rms a_K at {ride.point} [m/s2]", shown(ride.rms_aK_m_per_s2)
     for measure in run.comfort:
         name = f"{measure.case}: {measure.measure} at {measure.point} [{measure.unit}], {measure.edition}"
-        yield name, _number(measure.value)
+        yield name, shown(measure.value)
 
 
 # --- JSON: the numbers that people see, under the names that the files have ---

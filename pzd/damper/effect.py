@@ -49,6 +49,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Literal
 
+from pzd.quantities import BINGHAM
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -263,7 +265,7 @@ class Effect:
 
 # --- Functions of each place, and the rules ---
 
-ELEMENT = ("T0", "C", "k")
+ELEMENT = tuple(quantity.symbol for quantity in BINGHAM)
 """Parameters of the element, whose names no parameter of an effect may take."""
 NODE_VOLTAGES = "at_voltage_V"
 """Key of the voltages at which an effect's parameters are given in a config."""

@@ -70,7 +70,19 @@ class ResidualCheck:
 def check_residual(
     given: PredictedForce, prepared: PreparedRecord, wanted: Mask, config: NuisanceConfig
 ) -> ResidualCheck:
-    """Compare a record with its predicted force, over the wanted samples past the warm-up."""
+    """Compare a record with its predicted force, over the wanted samples past the warm-up.
+
+    Parameters
+    ----------
+    given : force that a damper predicts for the record
+    prepared : the record
+    wanted : (n,) samples that are asked for
+    config : how far offset, gain and delay of a test may go
+
+    Returns
+    -------
+    what is left of the force in these samples, and how probable it is by noise alone
+    """
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
     mask = wanted & comparable_samples(prepared)

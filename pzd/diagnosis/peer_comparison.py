@@ -33,7 +33,7 @@ DESCENTS = 3
 Reason: time; the residual has few minima over the shape."""
 RESOLUTION = 1e-6
 """Residual that says nothing of a shape, as a share of the force (r.m.s.): far below what any sensor shows."""
-AT_LIMIT = 1e-3
+SHARE_AT_LIMIT = 1e-3
 """Share of the search range within which a shape parameter counts as at its limit; not tuned."""
 
 
@@ -93,7 +93,7 @@ def fit_peer(peer: Peer, form: PeerForm, tests: Sequence[PeerData]) -> PeerFit:
     )
     shape = _shape(peer, best.x)
     coefficients, residual = solved(shape)
-    inside = np.minimum(best.x - low, high - best.x) > AT_LIMIT * (high - low)
+    inside = np.minimum(best.x - low, high - best.x) > SHARE_AT_LIMIT * (high - low)
     limited = [p.name for p, free in zip(peer.shape, inside, strict=True) if not free]
     status = f"at its limit: {', '.join(limited)}" if limited else "converged" if best.converged else "not converged"
     return PeerFit(np.concatenate([coefficients, shape]), float(residual @ residual) * scale**2, status)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
-from pzd.artefacts.diagnosis import Support
+from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import rows_per_voltage
@@ -36,8 +35,6 @@ from pzd.record import Array
 from pzd.schema.errors import counted
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
-
-Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -378,7 +375,7 @@ def _total_probability(chances: Mapping[str | None, float], named: Collection[st
 
 NUISANCE_UNITS = NuisanceConfig(offset=0.01, delay_s=0.001, gain=0.01)
 """Units of the nuisances: a hundredth of the peak force, a millisecond, a hundredth of the force."""
-SAME_MOTION = 1e-6
+SAME_BUT_FOR_ROUNDING = 1e-6
 """Relative difference below which tests have the same frequency, speed, stroke or temperature.
 
 Reason: rounding in files; not tuned."""
@@ -489,7 +486,7 @@ def _within_condition_trend(
         inside = condition == each
         y[inside] -= y[inside].mean()
         x[inside] -= x[inside].mean()
-    if np.ptp(x) <= SAME_MOTION * max(1.0, float(np.max(np.abs(over[known])))):
+    if np.ptp(x) <= SAME_BUT_FOR_ROUNDING * max(1.0, float(np.max(np.abs(over[known])))):
         return None
     slope = float(x @ y / (x @ x))
     left = float(np.sum((y - slope * x) ** 2)) / free

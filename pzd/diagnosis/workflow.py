@@ -21,6 +21,7 @@ from pzd.artefacts import (
     Value,
     base_of,
 )
+from pzd.artefacts.diagnosis import Verdict
 from pzd.artefacts.knee import Knees, LawRow
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library, nameable
@@ -47,7 +48,6 @@ from pzd.diagnosis.support import support_of
 from pzd.diagnosis.verdict import (
     Conclusion,
     Decision,
-    Verdict,
     alone_note,
     conclude,
     hold_out_note,

@@ -22,7 +22,7 @@ from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow, Damper
 from pzd.export.drive import Drive
 from pzd.force_table.lookup import Lookup
-from pzd.quantities import CHANNELS, DAMPING, DISPLACEMENT, FRICTION, STIFFNESS, TEMPERATURE, VOLTAGE, Control
+from pzd.quantities import BINGHAM, CHANNELS, DISPLACEMENT, TEMPERATURE, VOLTAGE, Control
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import Frozen, safe_name
@@ -293,7 +293,7 @@ def effect_rows(content: Content) -> tuple[EffectRow, ...]:
 
 def _columns(content: Content, model: type[Frozen], rows: Sequence[Frozen]) -> Columns:
     control = content.control
-    quantities = (*CHANNELS, FRICTION, DAMPING, STIFFNESS)
+    quantities = (*CHANNELS, *BINGHAM)
     units = {q.column: q.unit for q in quantities} | {control.renamed(VOLTAGE.column): control.unit}
     units |= {"reference_temperature_degC": TEMPERATURE.unit, "zero_m": DISPLACEMENT.unit}
     left_out = set() if content.controlled else {VOLTAGE.column}

@@ -14,8 +14,10 @@ import numpy as np
 
 from pzd.record import Array
 
+CONFIDENCE = 0.95
+"""Probability that an interval holds the true value, unless another one is asked for."""
 LEVEL = 1.96
-"""Half width of a 95 % interval in standard errors."""
+"""Half width of such an interval in standard errors, where these are known: `CONFIDENCE` of the normal distribution."""
 SINGULAR = 1e-13
 """Eigenvalue of a normal matrix scaled to a unit diagonal, relative to the largest, below which it shows no direction.
 

@@ -37,7 +37,7 @@ ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 """Rounding of a residual, as a share of what its variables contribute to it: the root of a thousand operations."""
 BY_CHANCE = 3.0
 """Multiple of the resolution that residuals may have along the columns of the Jacobian: three standard deviations."""
-AT_LIMIT = 1e-2
+STANDARD_ERRORS_AT_LIMIT = 1e-2
 """Distance from a limit within which a variable lies at it [standard errors of that variable alone].
 
 Reason: the search stays inside its limits and comes as near as its precision lets it."""
@@ -216,7 +216,7 @@ def _judged(x: Array, residuals: Array, jacobian: Array, limits: _Limits, evalua
 
 def _at_limit(x: Array, gradient: Array, norms: Array, bounds: tuple[Array, Array], spread: float) -> Mask:
     """Return (p,) whether a variable lies at a limit and the sum of squares falls beyond it."""
-    near = AT_LIMIT * spread / np.where(norms > 0.0, norms, np.inf)
+    near = STANDARD_ERRORS_AT_LIMIT * spread / np.where(norms > 0.0, norms, np.inf)
     near = np.maximum(near, np.sqrt(ROUNDING) * np.maximum(1.0, np.abs(x)))
     low, high = bounds
     return np.asarray(((x - low <= near) & (gradient > 0.0)) | ((high - x <= near) & (gradient < 0.0)))

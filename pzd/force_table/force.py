@@ -142,7 +142,19 @@ def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
 def grid(
     config: TableConfig, damper: Damper, temperatures: Sequence[float | None], envelope: OperatingEnvelope
 ) -> TableNodes:
-    """Find nodes between which straight lines follow the damper's law within the tolerance."""
+    """Find nodes between which straight lines follow the damper's law within the tolerance.
+
+    Parameters
+    ----------
+    config : the block table: tolerance, and nodes that are given
+    damper : with its effects
+    temperatures : of the table, rising; a single None where there is none [degC]
+    envelope : speeds that the tests reached
+
+    Returns
+    -------
+    temperatures, voltages and speeds of the table
+    """
     voltages = voltages_of(damper)
     if config.voltages_V is not None and voltages != (None,):
         voltages = tuple(sorted(set(config.voltages_V)))
@@ -210,7 +222,19 @@ def refined(nodes: Array, law: Callable[[Array], Array], allowed: float) -> Arra
 def force_rows(
     config: TableConfig, damper: Damper, nodes: TableNodes, envelope: OperatingEnvelope
 ) -> tuple[ForceRow, ...]:
-    """Return one row per node; outside the envelope clamped, empty or by the model, as the config says."""
+    """Return one row per node; outside the envelope clamped, empty or by the model, as the config says.
+
+    Parameters
+    ----------
+    config : the block table: what stands outside of the envelope
+    damper : with its effects
+    nodes : of the table
+    envelope : speeds that the tests reached
+
+    Returns
+    -------
+    rows by temperature, voltage and velocity, rising in this order
+    """
     rows: list[ForceRow] = []
     velocity = nodes.velocities
     for temperature, voltage in ((T, U) for T in nodes.temperatures for U in nodes.voltages):

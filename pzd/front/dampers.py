@@ -15,7 +15,7 @@ from pzd.damper.model import Damper as Model
 from pzd.front.arguments import control_of, in_python, label, numbers
 from pzd.front.pipelines import config_of, pipeline_of
 from pzd.front.results import Result, frame_of, new_axes
-from pzd.quantities import FORCE, VELOCITY, Control
+from pzd.quantities import BINGHAM, FORCE, VELOCITY, Control
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 from pzd.schema.yamlfile import document_of
@@ -264,8 +264,8 @@ class Damper(Result):
         at += [f"{len(self.temperatures)} temperatures"] if len(self.temperatures) > 1 else []
         head = f"Damper, {' and '.join(at)}" if at else "Damper"
         spans = [
-            f"{symbol} {_span([getattr(row, name) for row in rows])} {unit}"
-            for symbol, name, unit in (("T0", "T0_N", "N"), ("C", "C_Ns_per_m", "N s/m"), ("k", "k_N_per_m", "N/m"))
+            f"{parameter.symbol} {_span([getattr(row, parameter.column) for row in rows])} {parameter.unit}"
+            for parameter in BINGHAM
         ]
         if all(np.isinf(row.k_N_per_m) for row in rows):
             spans[-1] = "k infinite (no oil spring)"

@@ -14,11 +14,11 @@ import numpy as np
 from typing_extensions import override
 
 from pzd.artefacts import Rig
-from pzd.artefacts.rig import CHANNELS
 from pzd.front.arguments import control_of, in_python, label, numbers
 from pzd.front.results import Result, new_axes
 from pzd.quantities import (
     ACCELERATION,
+    CHANNELS,
     DISPLACEMENT,
     FORCE,
     PRESSURE,

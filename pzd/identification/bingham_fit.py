@@ -28,7 +28,7 @@ from pzd.record import Array
 
 # --- Criterion and search coordinates ---
 
-AT_LIMIT = 1e-6
+AT_ZERO = 1e-6
 """A search coordinate below this lies at zero, a limit of the law: T0 a millionth of the peak force, C and 1/k as much
 of what no test shows."""
 
@@ -435,7 +435,7 @@ def ends_at_a_step(objective: Objective, parameters: Bingham) -> bool:
 
 def _settled(objective: Objective, x: Array, found: Fit) -> Fit:
     """Return the optimum in the limits of the law that it came next to, unless the criterion is less beside them."""
-    limit = np.where(x < AT_LIMIT, 0.0, x)
+    limit = np.where(x < AT_ZERO, 0.0, x)
     if np.array_equal(limit, x):
         return found
     settled = _fit_at(objective, objective.from_search(limit))

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from pzd.artefacts.identified import (
+    RISE_SHARES,
     AsItStandsRow,
     Characteristics,
     ContinuousVelocityRow,
@@ -240,8 +241,6 @@ def _at_one_speed(rows: Sequence[PeakVelocityRow]) -> tuple[float, float, float]
 #
 # Only at constant speed does the force change by the step alone; during any other motion a step has no times.
 
-RISE_SHARES = (0.63, 0.9)
-"""Shares of the change of force to which the time is given, as in data sheets."""
 LONGEST_RISE_S = 0.02
 """Longest step of the control signal [s]; a longer one is a ramp: supplies take a few milliseconds."""
 SETTLED_DRIFT = 0.05

@@ -33,6 +33,7 @@ from pzd.identification.prepared_record import FittedRecord, fitted_records, pre
 from pzd.identification.stiffness import OilSpring, oil_spring_alone, settle_stiffness
 from pzd.identification.trust import ParameterEvidence, Reservation
 from pzd.parallel.on_disk import one_at_a_time
+from pzd.quantities import BINGHAM, DAMPING, STIFFNESS
 from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
 from pzd.signals.measures import VISIBLE, criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
@@ -263,13 +264,13 @@ def parameter_row(
     """
     status, determined = trust.trust_of(evidence)
     cells = label_columns(labels)
-    names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "positive", "inverse"), strict=True)
+    names = zip((quantity.column for quantity in BINGHAM), ("positive", "positive", "inverse"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
-        if not known and name == "C_Ns_per_m" and np.isfinite(width):
+        if not known and name == DAMPING.column and np.isfinite(width):
             cells |= {**interval_columns(name, value, float(width), scale), name: None}
     if stiffest is not None and np.isfinite(stiffest):
-        cells["k_N_per_m_low95"] = stiffest
+        cells[f"{STIFFNESS.column}_low95"] = stiffest
     cells |= {"W_s": missed[0], "rmse_N": missed[1], "status": status}
     return ParameterRow.model_validate(cells)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from pzd.fit.intervals import UNINFORMATIVE, inverse_normal, student_quantile
+from pzd.fit.intervals import CONFIDENCE, UNINFORMATIVE, inverse_normal, student_quantile
 from pzd.fit.spread import PRIOR_WORTH, NuisanceEquations, nuisance_equations
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
@@ -77,7 +77,7 @@ class VarianceSources:
     missed: Array
     """(p,) variance by what the model misses, and by a hidden law that no test shows."""
 
-    def half_widths(self, level: float = 0.95, spread: Array = AS_BEFOREHAND) -> Array:
+    def half_widths(self, level: float = CONFIDENCE, spread: Array = AS_BEFOREHAND) -> Array:
         """Compute the half widths (p,) of the two-sided intervals, infinite where the force does not depend on it.
 
         Equation: V = sum_t w' (Z_t + L N_t) w + N m^2 B, w a row of B = (J'J)^-1, Z_t between cycles, N_t of the
@@ -97,7 +97,7 @@ class VarianceSources:
         return np.where(self.unseen, np.inf, quantile * np.sqrt(together.variance) / self.size)
 
 
-def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 0.95) -> Array:
+def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = CONFIDENCE) -> Array:
     """Compute the half widths of the two-sided intervals of a least-squares estimate, sensors as beforehand.
 
     Parameters
@@ -353,7 +353,7 @@ class Uncertainty:
     degrees_of_freedom: float
     """Independent residuals less parameters, for Student's t."""
 
-    def half_widths(self, level: float = 0.95) -> Array:
+    def half_widths(self, level: float = CONFIDENCE) -> Array:
         """Return the half widths (p,) of the two-sided intervals."""
         quantile = student_quantile(self.degrees_of_freedom, 0.5 + 0.5 * level)
         return np.asarray(quantile * np.sqrt(np.diag(self.covariance)))

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, ParameterRow, PredictedRow, UnitRow
-from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
+from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
 from pzd.fit.cross_validation import (
@@ -186,11 +186,11 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
     values: dict[str, float] = {"friction_N": curve.friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
     values["k_N_per_m"] = curve.stiffness
     for way, direction in enumerate(DIRECTIONS):
-        values[f"{direction}_bleed_Ns_per_m"] = curve.bleed[way]
+        bleed, *of_knee = (f"{direction}_{column}" for column in OF_A_DIRECTION)
+        values[bleed] = curve.bleed[way]
         if fit.form.has_knee[way]:
-            values[f"{direction}_knee_force_N"] = curve.knee_force(way)
-            values[f"{direction}_knee_velocity_m_per_s"] = curve.knee_speed[way]
-            values[f"{direction}_blow_off_Ns_per_m"] = curve.blow_off[way]
+            shape = curve.knee_force(way), curve.knee_speed[way], curve.blow_off[way]
+            values |= zip(of_knee, shape, strict=True)
     cells: dict[str, float | None] = {}
     for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
         scale = "positive" if name == "friction_N" else "linear" if name.startswith("gas") else "log"

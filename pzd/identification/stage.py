@@ -9,14 +9,14 @@ from dataclasses import replace
 from pzd.artefacts import AuxiliaryRow, Characteristics, Identified, Knees, ParameterRow, Rig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
-from pzd.quantities import TEMPERATURE, Control
+from pzd.quantities import BINGHAM, TEMPERATURE, Control
 from pzd.record import Condition, Labels, Record, conditions, distinct, merged_voltages
 from pzd.schema.errors import ConfigError, DataError, counted, supported
 from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 
 log = logging.getLogger(__name__)
 
-WORTH_A_PROCESS = 2_000_000
+SAMPLES_WORTH_A_PROCESS = 2_000_000
 """Fewest samples in all for which conditions and records are worked on in separate processes, which have to start."""
 
 _VOLTAGE = Control()
@@ -55,7 +55,7 @@ def identify(
     from pzd.identification.characteristics import characteristics
     from pzd.identification.strokes_and_loops import measures
 
-    jobs = jobs if sum(record.time.size for record in rig.records) > WORTH_A_PROCESS else 1
+    jobs = jobs if sum(record.time.size for record in rig.records) > SAMPLES_WORTH_A_PROCESS else 1
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
     constant, moving = conditions(distinct(rig.records), identify.group.voltage_V, identify.group.temperature_degC)
@@ -196,7 +196,7 @@ def _parameter_text(row: ParameterRow) -> str:
     voltage = None if row.voltage_V is None else f"{row.voltage_V:.4g}"
     temperature = None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC"
     place = ", ".join(part for part in (row.setting, voltage, temperature) if part)
-    T0, C, k = (_supported(row, name) for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
+    T0, C, k = (_supported(row, quantity.column) for quantity in BINGHAM)
     return f"{place or 'all records'}: T0 = {T0} N, C = {C} N s/m, k = {k} N/m, W_s = {row.W_s:.3g}, {row.status}"
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pzd.artefacts import MeasureRow
 from pzd.artefacts.identified import Kind
-from pzd.artefacts.rig import SAME_MOTION, same_motion
+from pzd.artefacts.rig import SAME_SET_VALUE, same_motion
 from pzd.identification.prepared_record import warm_up
 from pzd.parallel.processes import parallel_map
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
@@ -33,7 +33,8 @@ MIDDLE_PART = (0.4, 0.6)
 STRAIGHT_PIECES = 4
 """Pieces of equal length of the straight part, whose speeds are compared."""
 CONSTANT_SPEED = 0.03
-"""Largest relative deviation of a constant speed from its mean; that of a sine changes by 5 % over these pieces."""
+"""Largest relative deviation of a constant speed from its mean; that of a sine changes by 5 % over these pieces, and
+stays within it for a sixth of its cycle."""
 SINUSOIDAL = 0.03
 """Largest r.m.s. deviation of a sine from half a cosine, as a share of stroke: a crank has 0.02, a triangle 0.07."""
 AROUND_PEAK = 0.7
@@ -167,7 +168,16 @@ MID_STROKE_SPEED = 0.1
 
 
 def strokes_of(time: Array, displacement: Array, force: Array) -> list[Stroke]:
-    """Return the whole strokes between reversals, the ends of the record among them."""
+    """Return the whole strokes between reversals, the ends of the record among them.
+
+    Parameters
+    ----------
+    time, displacement, force : (n,) of one record [s], [m], [N]
+
+    Returns
+    -------
+    those of `SHORT_STROKE` of the record's and more, in their order
+    """
     turns = sorted({0, *reversals(displacement), displacement.size - 1})
     found = [
         Stroke(time[first : last + 1], displacement[first : last + 1], force[first : last + 1])
@@ -293,8 +303,6 @@ def _cycle_from_lowest(time: Array, displacement: Array, velocity: Array, force:
 
 SPEED_WINDOWS = 16
 """Windows in a cycle in which a constant speed is sought: long against noise, short against a stroke."""
-LOOP_CONSTANT_SPEED = 0.03
-"""Largest relative deviation of a constant speed; a sine stays within it for a sixth of its cycle."""
 CONSTANT_SPEED_SHARE = 0.5
 """Least share of the cycle in which a test of constant speed keeps it."""
 
@@ -378,7 +386,13 @@ def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
 
 
 def force_at_rest(velocity: Array, force: Array, closed: bool) -> float:
-    """Compute the mean of abs(F) where the speed passes through zero [N]; 0 where it never does."""
+    """Compute the mean of abs(F) where the speed passes through zero [N]; 0 where it never does.
+
+    Parameters
+    ----------
+    velocity, force : (n,) [m/s], [N]
+    closed : whether the last sample is followed by the first, as in an average cycle
+    """
     if closed:
         velocity, force = np.append(velocity, velocity[0]), np.append(force, force[0])
     before = np.flatnonzero((velocity[:-1] >= 0.0) != (velocity[1:] >= 0.0))
@@ -401,7 +415,7 @@ def peak_speed(loop: Loop) -> float:
         return largest
     apart = np.abs(np.roll(loop.displacement, -width) - loop.displacement) / (width * loop.step)
     level = float(np.median(apart))
-    constant = np.count_nonzero(np.abs(apart - level) <= LOOP_CONSTANT_SPEED * level) >= CONSTANT_SPEED_SHARE * points
+    constant = np.count_nonzero(np.abs(apart - level) <= CONSTANT_SPEED * level) >= CONSTANT_SPEED_SHARE * points
     return level if constant else largest
 
 
@@ -439,8 +453,8 @@ class _SameTests:
     def to(self, row: MeasureRow) -> list[MeasureRow]:
         """Return the periodic tests that are the same but for the voltage, in the order of the rows."""
         speed, of_setting = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
-        low = bisect_left(of_setting, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
-        high = bisect_right(of_setting, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        low = bisect_left(of_setting, speed * (1.0 - 2.0 * SAME_SET_VALUE), key=lambda entry: entry[0])
+        high = bisect_right(of_setting, speed * (1.0 + 2.0 * SAME_SET_VALUE), key=lambda entry: entry[0])
         return [r for _, _, r in sorted(of_setting[low:high], key=lambda entry: entry[1]) if _same_test(r, row)]
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.identification.bingham_fit import AT_LIMIT, Bingham, Objective, ends_at_a_step
+from pzd.identification.bingham_fit import AT_ZERO, Bingham, Objective, ends_at_a_step
 from pzd.identification.prepared_record import FittedRecord
 from pzd.parallel.on_disk import one_at_a_time
+from pzd.quantities import BINGHAM
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
 from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
@@ -129,7 +130,7 @@ def _percent(share: float) -> str:
 
 # --- Evidence on each parameter ---
 
-PARAMETER_NAMES = ("T0", "C", "k")
+PARAMETER_NAMES = tuple(quantity.symbol for quantity in BINGHAM)
 TARE = 0.3
 """Mean force, as a share of the r.m.s., above which a tare of the load cell is suggested."""
 
@@ -287,7 +288,7 @@ def not_converged(objective: Objective, parameters: Bingham, cosines: Array, *, 
     whole : whether T0, C and k are all that was fitted to these data
     """
     x = objective.coordinates.to_search(*parameters)
-    moving = [c > CONVERGENCE_COSINE and at > AT_LIMIT for c, at in zip(cosines.tolist(), x.tolist(), strict=True)]
+    moving = [c > CONVERGENCE_COSINE and at > AT_ZERO for c, at in zip(cosines.tolist(), x.tolist(), strict=True)]
     return moving if any(moving) and not (whole and ends_at_a_step(objective, parameters)) else [False] * len(moving)
 
 

@@ -106,22 +106,6 @@ def flow_force(valve: Valve, setting: str, voltage: float, temperature: float, s
     return float(brentq(excess, 0.0, 1e6, xtol=1e-9))
 
 
-VALVE = Valve(
-    laminar=5.63364e-08,
-    turbulent=2.27733e-05,
-    compliance=6.60238e-09,
-    zero_error=-1.03176e-05,
-    stroke_50=1.01844e-05,
-    stroke_100=3.64595e-05,
-    stroke_100_small=4.34934e-05,
-    stroke_150=5.96557e-05,
-    viscosity_fall=0.00609311,
-    friction=121.985,
-    friction_fall=0.058171,
-)
-"""Result of `calibrate`; the dampers of configs/paper.yaml are written from it."""
-
-
 def peak_force(valve: Valve, row: Expected) -> float:
     """Compute the peak force [N] of the test of a published row, the oil spring rigid."""
     temperature = row.temperature_degC or REFERENCE_DEGC

@@ -15,6 +15,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import PreparedRecord, prepare
 from pzd.diagnosis.fit.prediction import predicted_force
+from pzd.quantities import BINGHAM
 from pzd.record import Array, Record
 from pzd.report.blocks import amount
 from pzd.report.rig_tests import settled
@@ -98,7 +99,7 @@ def _force(damper: Damper, record: Record, prepared: Sequence[PreparedRecord]) -
 def _fitted_row(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:
     """Return the row that was fitted with a base row; None where that has other values now."""
     for row in rows:
-        pairs = [(getattr(row, column), getattr(base, column)) for column in ("T0_N", "C_Ns_per_m", "k_N_per_m")]
+        pairs = [(getattr(row, parameter.column), getattr(base, parameter.column)) for parameter in BINGHAM]
         same_condition = (row.voltage_V, row.temperature_degC) == (base.voltage_V, base.temperature_degC)
         if same_condition and all(fitted is None or fitted == value for fitted, value in pairs):
             return row

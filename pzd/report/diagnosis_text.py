@@ -46,7 +46,7 @@ _LEAST_OWN = 0.1
 r.m.s., as the headline has it, less is a twentieth."""
 
 
-def _number(value: float | None, unit: str = "") -> str:
+def shown(value: float | None, unit: str = "") -> str:
     """Return a number with its unit as tables of the terminal have it."""
     from pzd.report.columns import TERMINAL  # here, since `pzd --help` needs neither tables nor numpy
 
@@ -134,8 +134,8 @@ def _gap(diagnosis: Diagnosis) -> str:
         gap.hold_out, f"{gap.hold_out} of {records}"
     )
     return (
-        f"gap on what no fit has seen ({held_out}): W_s {_number(gap.before)} before, {_number(gap.after)} after"
-        f"{share}; {noise_named(gap)} gives {_number(gap.noise_floor)}"
+        f"gap on what no fit has seen ({held_out}): W_s {shown(gap.before)} before, {shown(gap.after)} after"
+        f"{share}; {noise_named(gap)} gives {shown(gap.noise_floor)}"
     )
 
 
@@ -147,19 +147,19 @@ def noise_named(gap: Gap) -> str:
 
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
     def errors(each: Prediction | HeldOutTest | HeldOutVoltage) -> str:
-        return f"W_s {_number(each.W_s_plain)} plain, {_number(each.W_s)} as handed on"
+        return f"W_s {shown(each.W_s_plain)} plain, {shown(each.W_s)} as handed on"
 
     held_out = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")
     yield f"prediction of {held_out} kept back: {errors(found)}"
     if every_test:
         for each in found.by:
-            at = "" if each.voltage is None else f" at {_number(each.voltage, unit)}"
+            at = "" if each.voltage is None else f" at {shown(each.voltage, unit)}"
             # An earlier version wrote no R2.
             R2 = "" if each.R2 is None or each.R2_plain is None else f"; R2 {each.R2_plain:.4f} and {each.R2:.4f}"
             yield f"kept back: {each.record}{at}, {errors(each)}{R2}"
     listed = sorted(found.left_out_voltages, key=lambda left: -left.W_s)
     for left in listed if every_test else listed[:1]:
-        yield f"left out: {_number(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
+        yield f"left out: {shown(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
 
 
 def counted_from(diagnosis: Diagnosis, effect: str, name: str, place: str) -> str:
@@ -194,10 +194,10 @@ def _value(value: Value, unit: str) -> str:
     edited = " (edited by hand)" if value.low95 is None and value.high95 is None else ""
     if value.at_voltage_V is not None:
         pairs = zip(value.estimates, value.at_voltage_V, strict=True)
-        return "; ".join(f"{_number(one.value, value.unit)} at {_number(at, unit)}" for one, at in pairs) + edited
+        return "; ".join(f"{shown(one.value, value.unit)} at {shown(at, unit)}" for one, at in pairs) + edited
     (estimate,) = value.estimates
     if estimate.interval is None:
-        return f"{_number(estimate.value, value.unit)}{edited}"
+        return f"{shown(estimate.value, value.unit)}{edited}"
     return f"{TERMINAL.text(estimate, value.unit)}{edited}"
 
 
@@ -207,9 +207,9 @@ def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
     adopted = {one.effect: one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects}
     # What was added for its prediction alone was in no round of the search: then no figure there is the damper's.
     whole = adopted.keys() == {*diagnosis.effects}
-    against = f" against {_number(min(adopted.values()))}" if adopted and whole else ""
+    against = f" against {shown(min(adopted.values()))}" if adopted and whole else ""
     for one in others[:_MOST]:
-        yield f"not taken: {one.effect}, W_s {_number(one.gap_after)}{against} on the tests seen, {one.reason}"
+        yield f"not taken: {one.effect}, W_s {shown(one.gap_after)}{against} on the tests seen, {one.reason}"
 
 
 def _hypotheses(found: Hypotheses) -> Iterator[str]:
@@ -227,9 +227,9 @@ def _shape(row: HypothesisRow) -> str:
     from pzd.artefacts.csv_rows import Estimate
     from pzd.report.columns import TERMINAL
 
-    more = f" and {_number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
+    more = f" and {shown(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
     value = TERMINAL.interval(Estimate.of(row, "coefficient"))
-    at = f", {row.parameter} = {_number(row.parameter_value, row.parameter_unit or '')}" if row.parameter else ""
+    at = f", {row.parameter} = {shown(row.parameter_value, row.parameter_unit or '')}" if row.parameter else ""
     closes = f"would close {row.closes:.0%} of the gap on tests kept back"
     unit = "" if row.unit == "-" else f" {row.unit}"
     return f"c {row.shape}, c = {value}{more}{unit}{at}: {closes}"
@@ -245,16 +245,16 @@ def next_test_line(test: NextTest, unit: str) -> str:
     voltages = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
     parts = [
         test.waveform,
-        _number(test.frequency_Hz, "Hz") if test.frequency_Hz is not None else "",
-        _number(test.amplitude_m, "m") if test.amplitude_m is not None else "",
+        shown(test.frequency_Hz, "Hz") if test.frequency_Hz is not None else "",
+        shown(test.amplitude_m, "m") if test.amplitude_m is not None else "",
         f"about {test.middle_m:.6g} m" if test.middle_m is not None else "",
-        f"at {' and '.join(_number(v, unit) for v in voltages)}" if voltages != (None,) else "",
+        f"at {' and '.join(shown(v, unit) for v in voltages)}" if voltages != (None,) else "",
     ]
     peaks = ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
-    reached = [_number(value, of) for value, of in peaks if value is not None]
+    reached = [shown(value, of) for value, of in peaks if value is not None]
     far = f", up to {' and '.join(reached)}" if reached else ""
     aim = f" to tell {' from '.join(test.separates)}" if test.separates else " to settle what these tests leave open"
     if test.between_voltage_V is not None:
-        low, high = (_number(voltage) for voltage in test.between_voltage_V)
+        low, high = (shown(voltage) for voltage in test.between_voltage_V)
         aim = f", since between {low} and {high} {unit} the force is known least"
     return f"next test: {' '.join(part for part in parts if part)}{far}{aim}"

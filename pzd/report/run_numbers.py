@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pzd.artefacts import ComfortRow, Identified, Rides, SummaryRow
 from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.rig import ANY, Conditions, ambiguous_conditions, matching
-from pzd.quantities import Control
+from pzd.quantities import BINGHAM, Control
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.study.plan import PLAIN_SUFFIX
@@ -36,7 +36,7 @@ _MEASURES = {
     "equivalent_damping_Ns_per_m": "N s/m",
     "dynamic_range": PURE,
 }
-_PARAMETERS = {"T0_N": "N", "C_Ns_per_m": "N s/m", "k_N_per_m": "N/m", "W_s": PURE, "rmse_N": "N"}
+_PARAMETERS = {**{quantity.column: quantity.unit for quantity in BINGHAM}, "W_s": PURE, "rmse_N": "N"}
 _SUMMARY = {
     "peak_abs_aK_m_per_s2": "m/s2",
     "rms_aK_m_per_s2": "m/s2",

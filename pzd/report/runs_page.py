@@ -13,7 +13,7 @@ from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.identified import PeakVelocityRow
 from pzd.damper.compose import static_force
 from pzd.damper.model import BaseRow, Damper
-from pzd.quantities import Control
+from pzd.quantities import BINGHAM, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 from pzd.report.blocks import (
     Card,
@@ -206,10 +206,13 @@ def _difference_column(run: str, first: str) -> Column:
 def _parameter_tables(runs: Sequence[ComparedRun]) -> Iterator[Table]:
     """Yield T0, C and k by condition."""
     places = _matched(runs, lambda run: run.parameters)
-    for name, head, unit in (("T0_N", "T0", "N"), ("C_Ns_per_m", "C", "N s/m"), ("k_N_per_m", "k", "N/m")):
-        rows = [_Row(place.words, {run: Estimate.of(row, name) for run, row in place.rows.items()}) for place in places]
+    for parameter in BINGHAM:
+        rows = [
+            _Row(place.words, {run: Estimate.of(row, parameter.column) for run, row in place.rows.items()})
+            for place in places
+        ]
         if any(value.value is not None for row in rows for value in row.values.values()):
-            yield _table(head, "condition", unit, rows, runs)
+            yield _table(parameter.symbol, "condition", parameter.unit, rows, runs)
 
 
 def _effect_tables(runs: Sequence[ComparedRun]) -> Iterator[Table]:

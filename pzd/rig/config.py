@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pzd.quantities import CHANNELS, DAMPING, FRICTION, STIFFNESS, TIME, VOLTAGE, Control
+from pzd.quantities import BINGHAM, CHANNELS, TIME, VOLTAGE, Control
 from pzd.rig.stand.config import VirtualEntry
 from pzd.schema.model import Frozen, all_keys
 
@@ -55,7 +55,7 @@ def own_words() -> frozenset[str]:
 
     effects = library().values()
     parameters = [parameter.name for effect in effects for parameter in effect.parameters]
-    base = [quantity.name for quantity in (FRICTION, DAMPING, STIFFNESS)]
+    base = [quantity.name for quantity in BINGHAM]
     words = [*base, *parameters, *(effect.name for effect in effects), *all_keys()]
     # A parameter F_0 is read as that of a control called F, and a key `units` as several of a control called unit.
     return frozenset(stem for word in words for stem in (word, re.sub(r"s?(?:_\d+)?$", "", word)))

@@ -229,7 +229,7 @@ def _refined_run(time: Array, displacement: Array, found: PeriodicSection) -> Cy
     coarse, x = decimated_means(time, displacement, found.period, FITTED_POINTS)
     run = _fitted_period(time, coarse, x, found)
     for _ in range(EDGE_ROUNDS):
-        start, end = _repeating_span(time, displacement, run.period, (found.start, found.end), SAME_MOTION)
+        start, end = _repeating_span(time, displacement, run.period, (found.start, found.end), SAME_DISPLACEMENT)
         if (start, end) == (found.start, found.end) or end - start < FEWEST_CYCLES * run.period:
             break
         found = PeriodicSection(run.period, start, end)
@@ -312,7 +312,7 @@ STANDS_OUT = 5.0
 """Multiple of the median difference that is a departure: 3.4 standard deviations of normal noise."""
 LIKE_OTHERS = 4.0
 """Multiple of the lower quartile of the differences at the same phase that a departure exceeds as well."""
-SAME_MOTION = 1e-3
+SAME_DISPLACEMENT = 1e-3
 """Difference of the displacement that always counts as repeating, as a share of its range."""
 SAME_FORCE = 2e-3
 """Difference of the force that always counts as repeating, as a share of its range."""

@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.record import Array, Mask
+from pzd.record import MAD_TO_SIGMA, Array, Mask
 from pzd.signals.cycles import Cycles
-from pzd.signals.measures import MAD_TO_SIGMA, noise_beside_motion, reversals
+from pzd.signals.measures import noise_beside_motion, reversals
 
 # --- Jumps of the force ---
 

@@ -11,7 +11,7 @@ from weakref import ref
 
 import numpy as np
 
-from pzd.record import Array, running_median
+from pzd.record import MAD_TO_SIGMA, Array, running_median
 
 SIGNIFICANCE = 1e-3
 """Probability by noise alone below which a misfit is believed: of a thousand plain dampers one looks so."""
@@ -140,10 +140,6 @@ def criterion_error(squares: Array, energies: Array) -> float:
 
 WHOLE_STEPS = 0.05
 """Largest median distance of the steps of a quantised channel from a whole number of the least one."""
-
-
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 def noise_beside_motion(values: Array) -> float:

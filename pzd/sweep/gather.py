@@ -14,7 +14,7 @@ import numpy as np
 
 from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, Scatter, SweepConfig, Uniform
-from pzd.quantities import Control
+from pzd.quantities import BINGHAM, Control
 from pzd.record import Array
 from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section, shortened
 from pzd.report.columns import Column, Table
@@ -271,7 +271,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURES = {
-    "identify": ("T0_N", "C_Ns_per_m", "k_N_per_m", "W_s"),
+    "identify": (*(quantity.column for quantity in BINGHAM), "W_s"),
     "diagnose": ("W_s", "gap_after", "confidence"),
     "simulate": ("a_w_m_per_s2", "rms_wheel_load_N", "peak_deflection_m"),
 }

@@ -25,6 +25,7 @@ from pzd.parallel.chunks import TRIES
 from pzd.pipeline.command import Opened, opened
 from pzd.pipeline.execution import InMemory, unaffected
 from pzd.pipeline.stages import Stage, stages
+from pzd.quantities import BINGHAM
 from pzd.record import Array
 from pzd.schema.errors import ConfigError, DataError, UserError
 from pzd.schema.model import Frozen
@@ -134,7 +135,7 @@ def _task(sweep: SweepConfig, number: int, over: tuple[tuple[str, Scalar], ...],
 
 # --- Scatter of the damper: its parameters moved, at all conditions alike ---
 
-BASE_COLUMNS = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
+BASE_COLUMNS = {quantity.symbol: quantity.column for quantity in BINGHAM}
 """Columns of the Bingham parameters, by their symbol."""
 
 

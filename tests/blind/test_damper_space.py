@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.blind.independent.damper_space import SOFTEST, bingham_levels, elastic_levels
+from pzd.blind.independent.damper_space import SOFTEST, elastic_levels
+from tests.studies.plain_damper import bingham_levels
 
 SPEED, STROKE = 0.3, 0.02
 

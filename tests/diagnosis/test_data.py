@@ -10,7 +10,6 @@ from numpy.random import Generator
 from synthetic import damper_of, sine, sines
 
 from pzd.blind.independent import stand
-from pzd.blind.independent.kernel import plain_force
 from pzd.blind.independent.stand import Actuator, LaboratoryCampaign, LaboratoryTest, MotionKind
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
@@ -21,6 +20,7 @@ from pzd.diagnosis.gap import check_residual, visible_gap
 from pzd.record import Array, Record
 from pzd.signals.noise import pure_error
 from pzd.signals.nuisance import NuisanceConfig
+from tests.studies.plain_damper import plain_force
 
 
 @pytest.mark.parametrize("channel", ["force", "velocity", "displacement"])

@@ -11,7 +11,6 @@ from numpy.random import Generator
 from synthetic import STAND
 
 from pzd.artefacts import Diagnosed, ParameterRow, Rig
-from pzd.blind.independent.kernel import plain_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import prepare
@@ -23,6 +22,7 @@ from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
+from tests.studies.plain_damper import plain_force
 
 FINER = 32
 """Steps of the integration a sample."""

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from scipy.optimize import least_squares
 from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, problem_of, sine, sines
 
-from pzd.artefacts.diagnosis import Support
+from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.config import DiagnoseConfig
@@ -29,7 +29,6 @@ from pzd.diagnosis.thresholds import LIKELIER_THAN_NOT
 from pzd.diagnosis.verdict import (
     Decision,
     NuisanceTrend,
-    Verdict,
     _hints,
     knee_note,
     nuisance_trend,

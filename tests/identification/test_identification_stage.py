@@ -53,7 +53,7 @@ def test_parameters_are_the_same_where_nobody_asks_what_the_tests_show_without_a
 def test_conditions_fitted_in_processes_of_their_own_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[Progress] = []
     alone = identify(IdentifyConfig(), rig(), seed=1, progress=told.append)
-    monkeypatch.setattr("pzd.identification.stage.WORTH_A_PROCESS", 0)
+    monkeypatch.setattr("pzd.identification.stage.SAMPLES_WORTH_A_PROCESS", 0)
     together = list[Progress]()
     found = identify(IdentifyConfig(), rig(), seed=1, progress=together.append, jobs=3)
     assert vars(found) == vars(alone)

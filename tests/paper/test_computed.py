@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from calibrated_valve import VALVE
 
 from pzd.artefacts import Identified, ReferenceRow, Rides
 from pzd.config import RunConfig
 from pzd.paper.published import FORCE_AT_REST, LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
-from pzd.paper.valve import VALVE
 from pzd.quantities import Control
 from pzd.report.reference import Expected, compared
 from pzd.report.run_numbers import RunNumbers

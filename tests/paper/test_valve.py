@@ -7,12 +7,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
+from calibrated_valve import VALVE
 
 from pzd.config import load
 from pzd.damper.model import Damper
 from pzd.paper.__main__ import written
 from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, loop_in, loop_of, published, rig_tests, span
-from pzd.paper.valve import STIFFNESS, VALVE, Valve, calibrate, flow_force, least_stiffness, stand_damper
+from pzd.paper.valve import STIFFNESS, Valve, calibrate, flow_force, least_stiffness, stand_damper
 from pzd.report.reference import Expected
 
 LAMINAR = replace(VALVE, turbulent=0.0, compliance=0.0, zero_error=0.0)

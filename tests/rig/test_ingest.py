@@ -34,7 +34,7 @@ def test_canonical_columns_need_nothing_but_the_path(tmp_path: Path) -> None:
 def test_two_processes_read_what_one_reads_and_refuse_it_in_the_same_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.rig.files.reading.WORTH_A_PROCESS", 0)
+    monkeypatch.setattr("pzd.rig.files.reading.BYTES_WORTH_A_PROCESS", 0)
     for name in "abc":
         write(tmp_path / f"{name}.csv", lines(CANONICAL | {"force_N": FORCE * (1.0 + ord(name))}))
     config = RigConfig.model_validate_json(json.dumps({"files": [{"path": "*.csv"}]}))

@@ -21,7 +21,7 @@ from pzd.simulate.ride.model import dynamic_damper_of, grid_of
 from pzd.simulate.ride.riding import ride_case
 from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
-from pzd.simulate.study.plan import cases
+from pzd.simulate.study.plan import cases, checked_temperature
 
 SHORT = {"duration_s": 1.0, "settle_s": 0.2, "roads": [{"kind": "sine", "frequency_Hz": 2.25}]}
 
@@ -319,7 +319,16 @@ def test_a_rig_without_voltage_or_temperature_has_none_to_ride_at(damper) -> Non
 
 
 def test_a_voltage_and_a_temperature_as_close_as_conditions_of_a_rig_are_taken(damper) -> None:
-    ride(damper, policies=["passive"], fidelities=["table"], passive_voltage_V=151.0, temperature_degC=23.5)
+    """The table ends at 150 V and 22 degC: 2 % and 2 K beyond are the same condition, and ridden as its edge."""
+    asked = {"policies": ["passive"], "fidelities": ["table"]}
+    near = ride(damper, **asked, passive_voltage_V=152.9, temperature_degC=23.9)
+    assert near.ridden[0].voltage_V == 152.9
+    assert near.summary == ride(damper, **asked, passive_voltage_V=150.0, temperature_degC=22.0).summary
+    table = table_of(damper)
+    assert checked_temperature(config(temperature_degC=23.9), table) == 23.9
+    for beyond in ({"passive_voltage_V": 153.1}, {"temperature_degC": 24.1}, {"temperature_degC": 19.9}):
+        with pytest.raises(ConfigError, match="must lie within the table"):
+            ride(damper, table, **asked, **beyond)
 
 
 def test_a_damper_that_was_never_tested_at_0_volts_is_passive_at_its_lowest(damper) -> None:

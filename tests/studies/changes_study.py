@@ -42,14 +42,15 @@ from pzd.blind.independent.laws import LAWS, Scale
 from pzd.blind.independent.outside import OUTSIDE
 from pzd.blind.rates import Rate
 from pzd.damper.effects import library
-from pzd.diagnosis.changes.comparison import changes_between, changes_between_rigs
-from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.state import State, diagnosed_state
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.rig.config import FilesEntry, RigConfig
 
 CAMPAIGNS = ("two_by_two", "constant_stroke", "sines_and_triangles")
 ELEMENT = ("T0", "C", "k")
@@ -336,13 +337,18 @@ def _moved(name: str, start: Array, own: Array, factor: float) -> Array:
 
 
 def compared(given: Pair, *, diagnosed: bool) -> Changes:
-    """Return what is found."""
+    """Return what is found, from the first state as it was diagnosed, or else as it was identified."""
     rigs = Rig(given.before, ()), Rig(given.after, ())
     config, control = (DiagnoseConfig(), IdentifyConfig()), Control()
+    identified = [identify(config[1], rig, 1) for rig in rigs]
+    before, after = (
+        State.of(name, rig, found, None, control)
+        for name, rig, found in zip(("before", "after"), rigs, identified, strict=True)
+    )
     if diagnosed:
-        return changes_between_rigs(*rigs, *config, control).changes
-    states = [State.of(n, r, identify(config[1], r, 1), None, control) for n, r in zip("ab", rigs, strict=True)]
-    return changes_between(states[0], states[1], *config, control).changes
+        own_files = RigConfig(files=(FilesEntry(path="*"),))
+        before = diagnosed_state(before, rigs[0], identified[0], None, *config, own_files, control, 1)
+    return changes_between(before, after, *config, control).changes
 
 
 def _short(value: object) -> str:

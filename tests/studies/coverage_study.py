@@ -1,9 +1,9 @@
 """How often the 95 % intervals of identify hold the truth: `make coverage-study`.
 
-    PYTHONPATH=.:tests/identify python tests/studies/coverage_study.py [repeats, default 9] [--fresh]
+    PYTHONPATH=.:tests/identification python tests/studies/coverage_study.py [repeats, default 9] [--fresh]
 
-Every draw is a campaign on a damper whose T0, C and k are known (tests/identify/campaigns.py): one or
-several tests that repeat or do not, force noise of 1 % of peak with a correlation of 0, 0.5 or 0.9 from
+Every draw is a campaign on a damper whose T0, C and k are known (tests/identification/campaigns.py): one
+or several tests that repeat or do not, force noise of 1 % of peak with a correlation of 0, 0.5 or 0.9 from
 sample to sample, gain (2 %), offset (0.5 % of peak) and delay (0.5 ms) that differ from test to test, and
 an effect of 0 to 20 % of peak hidden in the damper. Printed is which share of the rows is `ok`, how
 often their intervals hold the truth of T0, C and k, and how often those of all other rows do: where the

@@ -4,7 +4,7 @@ Runs every test that draws on so many new seeds. What failed is run again on the
 whether the seed decides, and on as many new ones, which tells how often. A test that fails more often than the
 comment beside its bound says is wrong, or the code is; the command that is printed shows it again.
 
-    python tests/studies/fresh.py [--seeds 20] [--jobs 2] [--not-ci] [tests/diagnose ...]
+    python tests/studies/fresh.py [--seeds 20] [--jobs 2] [--not-ci] [tests/diagnosis ...]
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """When nothing is missing, does pzd say so? `make plain-study`: plain Bingham dampers from everywhere.
 
-    python tests/studies/plain_study.py [--cases 600] [--seed 20261126] [--jobs 2] [--list]
+    PYTHONPATH=. python tests/studies/plain_study.py [--cases 600] [--seed 20261126] [--jobs 2] [--list]
 
 Each case is a damper of one to five levels of the control signal, drawn by Sobol points: friction alone to viscous
 alone, rigid to a fifth of the stroke; measured by one to six tests a level, at 100 Hz to 5 kHz, with noise of 0.02 to
 3 % of peak, noise, resolution and zero of the displacement, gains, offsets and delays of the tests. The records are
-made by the integrator of the second generator (`pzd.blind.independent`). The stages rig, identify and diagnose then say
-what they make of it. Printed are the verdicts, where they come from, and how often intervals hold the truth; `--list`
-prints every case that was not judged right, with why.
+made by an integrator of their own (`plain_damper.py`) on the stand of the second generator. The stages rig, identify
+and diagnose then say what they make of it. Printed are the verdicts, where they come from, and how often intervals hold
+the truth; `--list` prints every case that was not judged right, with why.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ from scipy.stats import qmc
 
 from pzd.artefacts import ParameterRow, Rig
 from pzd.blind.independent import stand
-from pzd.blind.independent.damper_space import GROWTH, bingham_levels, log_between
-from pzd.blind.independent.kernel import plain_force
+from pzd.blind.independent.damper_space import GROWTH, log_between
 from pzd.blind.independent.stand import Actuator, Driven, LaboratoryCampaign, LaboratoryTest, MotionKind
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.stage import diagnose
@@ -46,6 +45,7 @@ from pzd.schema.errors import DataError
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 from pzd.signals.nuisance import NuisanceConfig
+from tests.studies.plain_damper import bingham_levels, plain_force
 
 SEED = 20261126
 CASES = 600

@@ -35,22 +35,6 @@ def with_ends(share: float) -> float:
     return float(np.clip((share - LIMIT_SHARE) / (1.0 - 2.0 * LIMIT_SHARE), 0.0, 1.0))
 
 
-def bingham_levels(u: Sequence[float], growth: Sequence[float], levels: int, speed: float, stroke: float) -> Array:
-    """Return T0 [N], C [N s/m] and k [N/m] (levels, 3) of a damper, its limits included: an infinite k is a rigid one.
-
-    Parameters
-    ----------
-    u : (6,) a point of the unit cube: peak force, friction in it, how rigid, by friction or damping, gain, and whether
-        friction or damping says what is rigid
-    growth : (2,) change of C and k up to the highest level
-    levels : of the control signal
-    speed : largest of the tests [m/s]
-    stroke : least of the tests, from end to end [m]
-    """
-    peak, share = log_between(u[0], *PEAK_FORCE), with_ends(u[1])
-    return _levels(share, peak, u[2:], growth, levels, speed, stroke)
-
-
 def elastic_levels(rng: Generator, levels: int, speed: float, stroke: float, quickest: float = QUICKEST) -> Array:
     """Draw T0 [N], C [N s/m] and k [N/m] (levels, 3) of a damper with friction, damping and an oil spring.
 
@@ -64,17 +48,29 @@ def elastic_levels(rng: Generator, levels: int, speed: float, stroke: float, qui
     """
     u, growth = rng.random(6), rng.uniform(*GROWTH, 2)
     share = float(np.clip(with_ends(u[1]), *BETWEEN_LIMITS))
-    found = _levels(share, log_between(u[0], *PEAK_FORCE), u[2:].tolist(), growth.tolist(), levels, speed, stroke)
+    found = levels_of(share, log_between(u[0], *PEAK_FORCE), u[2:].tolist(), growth.tolist(), levels, speed, stroke)
     # A damper of friction has an oil spring that the integration follows and that the tests overcome.
     found[:, 1] = np.maximum(found[:, 1], quickest * found[:, 0] / (SOFTEST * stroke))
     found[:, 2] = np.minimum(found[:, 2], found[:, 1] / quickest)
     return found
 
 
-def _levels(
+def levels_of(
     share: float, peak: float, u: Sequence[float], growth: Sequence[float], levels: int, speed: float, stroke: float
 ) -> Array:
-    """Return T0, C and k (levels, 3) from the friction's share of a peak force [N], and the rest of the point."""
+    """Return T0 [N], C [N s/m] and k [N/m] (levels, 3) of a damper; an infinite k is a rigid one.
+
+    Parameters
+    ----------
+    share : of the friction in the peak force
+    peak : force under no control signal, at the largest speed [N]
+    u : (4,) a point of the unit cube: how rigid, by friction or damping, gain, and whether friction or damping says
+        what is rigid
+    growth : (2,) change of C and k up to the highest level
+    levels : of the control signal
+    speed : largest of the tests [m/s]
+    stroke : least of the tests, from end to end [m]
+    """
     rigid, elasticity, of_gain, by_friction = u
     friction, damping = share * peak, (1.0 - share) * peak / speed
     gain = 1.0 + (MOST_GAIN - 1.0) * of_gain if levels > 1 else 1.0

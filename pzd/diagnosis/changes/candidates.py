@@ -24,13 +24,14 @@ from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
 from pzd.diagnosis.changes.state import about, acts_at_a_place
 from pzd.diagnosis.fit.problem import BOUND
+from pzd.quantities import BINGHAM
 from pzd.record import Array, Complex
 
 Of = Literal["damper", "stand"]
 
 LARGEST_GAIN = 0.05
 """Largest change of the gain that is the load cell's: a larger one is the damper's, by the contract."""
-LARGEST_DELAY = 0.005
+LARGEST_DELAY_S = 0.005
 """Largest change of the delay that is the recorder's [s]: a longer one is the damper's."""
 LEAST_FRICTION = 0.01
 """Share of the peak force from which T0 changes in proportion to itself; a smaller one in that of the peak force."""
@@ -40,7 +41,7 @@ FRICTION_STARTS = (0.0, -0.7, 1.5)
 RATIO_STARTS = (0.0, -1.2, 1.2)
 """Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
 DELAY_STARTS = (0.0, -0.6, 0.6)
-"""Where a fit of the delay begins [LARGEST_DELAY]: over a jump of dry friction no linearised step reaches far."""
+"""Where a fit of the delay begins [LARGEST_DELAY_S]: over a jump of dry friction no linearised step reaches far."""
 WEAK = 0.9
 """Slope beside C from which an effect without a linear coordinate starts too, as a share of it.
 
@@ -63,12 +64,12 @@ SHARE = "share"
 LEAST_WARMING = 0.5
 """Difference of the mean temperatures [K] from which temperature is a candidate: the resolution of a thermocouple."""
 
-ELEMENT_UNITS = {"T0": "N", "C": "N s/m", "k": "N/m"}
-ELEMENT_COLUMNS = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
+ELEMENT_UNITS = {quantity.symbol: quantity.unit for quantity in BINGHAM}
+ELEMENT_COLUMNS = {quantity.symbol: quantity.column for quantity in BINGHAM}
 STAND: Mapping[str, tuple[str, float]] = {
     "load_cell_zero": ("N", np.inf),
     "load_cell_gain": ("-", LARGEST_GAIN),
-    "recorder_delay": ("s", LARGEST_DELAY),
+    "recorder_delay": ("s", LARGEST_DELAY_S),
 }
 """Unit and largest size of what the stand may have done to the force; the zero of the displacement moves no force."""
 NOT_HERE = ("sensor_delay", "temperature_drift")

@@ -8,8 +8,8 @@ from typing import Literal, cast
 
 import numpy as np
 
-from pzd.artefacts import NextTest, Rig
-from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged
+from pzd.artefacts import NextTest
+from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict
 from pzd.damper.effects.accumulator import POLYTROPIC
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
@@ -37,7 +37,7 @@ from pzd.diagnosis.changes.pairs import (
 )
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
-from pzd.diagnosis.changes.state import State, about, diagnosed_state
+from pzd.diagnosis.changes.state import State, about
 from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
@@ -46,14 +46,11 @@ from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.diagnosis.verdict import knee_note
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.stage import identify as run_identify
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
-from pzd.rig.config import FilesEntry, Limits, RigConfig
+from pzd.rig.config import Limits
 from pzd.schema.errors import counted
 from pzd.signals.measures import criterion, rms
-
-Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
 
 GAS_LENGTHS = (1.0, 100.0)
 """Shortest and longest gas column, in half strokes, whose force and stiffness change together as those of a gas do.
@@ -146,36 +143,6 @@ def findings_between(
     )
     best = search.run()
     return Findings(first, search, best, diagnose, control, before, after, identify.law)
-
-
-def changes_between_rigs(
-    before: Rig,
-    after: Rig,
-    diagnose: DiagnoseConfig,
-    identify: IdentifyConfig,
-    control: Control,
-    settings: tuple[str | None, str | None] = (None, None),
-    names: tuple[str, str] = ("before", "after"),
-    jobs: int = 1,
-) -> Compared:
-    """Identify two states from their records, diagnose the first, and find what changed.
-
-    Parameters
-    ----------
-    before, after : records of both states
-    diagnose, identify : blocks of the config
-    control : the control signal
-    settings : of the rigs, the one that each state is
-    names : of the states
-    jobs : processes or threads that identification and diagnosis may use
-    """
-    stand = RigConfig(files=(FilesEntry(path="*"),))
-    rigs = zip(names, (before, after), settings, strict=True)
-    found = [(name, rig, run_identify(identify, rig, jobs), setting) for name, rig, setting in rigs]
-    first, second = (State.of(*each, control) for each in found)
-    _, rig, identified, setting = found[0]
-    first = diagnosed_state(first, rig, identified, setting, diagnose, identify, stand, control, jobs)
-    return changes_between(first, second, diagnose, identify, control)
 
 
 # --- Tests that have no average cycle
@@ -301,7 +268,7 @@ class Findings:
         return float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
 
     def _settled(self) -> tuple[Fitted, dict[str, list[Fitted]]]:
-        """Return the changes, a gas force in the place of a zero of the load cell where they show gas, and their rivals."""
+        """Return the changes, a gas force in the place of a load-cell zero where they show gas, and their rivals."""
         best = self._gas(self.best)
         rivals: dict[str, list[Fitted]] = {}
         for candidate in best.candidates:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.artefacts import Rig
-from pzd.artefacts.changes import Course, CourseRow, Numbers
+from pzd.artefacts.changes import Course, CourseRow, Numbers, Verdict
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate
-from pzd.diagnosis.changes.comparison import Findings, Verdict, findings_between
+from pzd.diagnosis.changes.comparison import Findings, findings_between
 from pzd.diagnosis.changes.pairs import averaged
 from pzd.diagnosis.changes.selection import GAIN
 from pzd.diagnosis.changes.state import State

@@ -21,7 +21,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import simulated_record
-from pzd.record import CONSTANT_SHARE, Array, Complex, Mask, Record
+from pzd.record import CONSTANT_SHARE, MAD_TO_SIGMA, Array, Complex, Mask, Record
 from pzd.signals.harmonics import mains_harmonics
 from pzd.signals.noise import PureError, pure_error
 
@@ -41,7 +41,7 @@ SAME_FREQUENCY = 0.02
 """Relative difference of two frequencies that count as one.
 
 Reason: the force of a viscous damper then differs by as much, which the model carries to a tenth of it."""
-SAME_MOTION = 0.1
+SAME_CYCLE = 0.1
 """R.m.s. difference of two displacements that count as one motion, as a share of the larger.
 
 Reason: what the model misses, often a tenth of the force, then counts for a hundredth of it."""
@@ -198,11 +198,11 @@ def paired(
             if abs(one.frequency - other.frequency) > SAME_FREQUENCY * one.frequency:
                 continue
             distance = motion_distance(one, other)
-            if distance <= SAME_MOTION:
+            if distance <= SAME_CYCLE:
                 warmer = 0.0
                 if one.temperature is not None and other.temperature is not None:
                     warmer = abs(one.temperature - other.temperature) / max(temperature_within, 1e-9)
-                cost[i, j] = distance / SAME_MOTION + warmer
+                cost[i, j] = distance / SAME_CYCLE + warmer
     rows, columns = linear_sum_assignment(cost)
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NO_TEST]
 
@@ -371,7 +371,7 @@ def jump_columns(test: AveragedTest, counted: Mask, shift: float) -> Array:
     """
     cycle = test.prepared.folded.mean(axis=0)
     steps = np.roll(cycle, -1) - cycle
-    usual = 1.4826 * float(np.median(np.abs(np.roll(steps, -1) - steps)))
+    usual = MAD_TO_SIGMA * float(np.median(np.abs(np.roll(steps, -1) - steps)))
     jump = np.abs(np.roll(steps, -1) - steps) > JUMP * usual
     jumps = np.where(jump | np.roll(jump, 1), steps, 0.0) / np.sqrt(12.0)
     spectra = (force_spectrum(np.where(sign * jumps > 0.0, jumps, 0.0), counted) for sign in (1.0, -1.0))

@@ -93,7 +93,22 @@ def diagnosed_state(
     control: Control,
     jobs: int,
 ) -> State:
-    """Return the state with the effects that a diagnosis in memory adopts, which the first state needs."""
+    """Return the state with the effects that a diagnosis in memory adopts, which the first state needs.
+
+    Parameters
+    ----------
+    state : as it was identified
+    rig, identified : its records, and what identify found in them
+    setting : of the rig, the one that the state is
+    diagnose, identify : blocks of the config
+    stand : block of the rig, for what the stand can do
+    control : the control signal
+    jobs : processes or threads that the diagnosis may use
+
+    Returns
+    -------
+    the same tests with the adopted damper
+    """
     from pzd.diagnosis.stage import diagnose as run_stage
 
     found = run_stage(diagnose, identify, stand, rig, identified, control, setting, jobs)

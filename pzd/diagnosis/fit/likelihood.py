@@ -306,7 +306,7 @@ class WeightedRecord:
 
         See `likeliest_delay`, which goes on from there.
         """
-        shares = np.linspace(-LARGEST_DELAY, LARGEST_DELAY, DELAYS_TRIED)
+        shares = np.linspace(-MOST_DEVIATIONS, MOST_DEVIATIONS, DELAYS_TRIED)
         left = self.standardised(np.column_stack([self.measured - at(share * self.delay_s) for share in shares]))
         return float(self.delay_s * shares[np.argmin(np.sum(left**2, axis=0) + shares**2)])
 
@@ -319,7 +319,7 @@ class WeightedRecord:
             left, own = self.standardised(np.column_stack([self.measured - force, late])).T
             square = float(own @ own)
             share = (float(own @ left) + square * delay / self.delay_s) / (1.0 + square)
-            before, delay = delay, self.delay_s * float(np.clip(share, -LARGEST_DELAY, LARGEST_DELAY))
+            before, delay = delay, self.delay_s * float(np.clip(share, -MOST_DEVIATIONS, MOST_DEVIATIONS))
             if abs(delay - before) < SAME_DELAY * self.delay_s:
                 break
         return delay
@@ -372,7 +372,7 @@ DELAY_STEP = 1e-6
 """Delay by which the slope of a force over time is differenced [s].
 
 Reason: far below a sample, far above the rounding of a time stamp."""
-LARGEST_DELAY = 3.0
+MOST_DEVIATIONS = 3.0
 """Standard deviations of a test's delay to which the part of the shift beyond its slope is limited.
 
 Reason: the customary bound for what a normal prior still allows."""

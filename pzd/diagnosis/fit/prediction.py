@@ -184,7 +184,7 @@ def unresolved_turns(damper: Damper, displacement: Array, *, closed: bool = Fals
 
 
 def drawn_calm(given: PredictedForce, calm: Mask, counted: Mask) -> list[tuple[Record, Array]]:
-    """Return the forces (m,) that the damper gives under the other motions that a noisy displacement leaves possible [N].
+    """Return the forces (m,) under the other motions that a noisy displacement leaves possible [N].
 
     Parameters
     ----------

@@ -41,7 +41,14 @@ LATE_OR_ELASTIC = (
 
 
 def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
-    """Say why a candidate is too little to be adopted; None where it is not."""
+    """Say why a candidate is too little to be adopted; None where it is not.
+
+    Parameters
+    ----------
+    evidence : of the tests, for the scales of their motion
+    config : the block diagnose: what pays, and what is visible
+    candidate : optimum with one more effect
+    """
     if candidate.delta_bic > config.adopt_bic:
         return "does not pay"
     if candidate.explained < config.visible:
@@ -73,7 +80,15 @@ def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
 
 
 def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate) -> str | None:
-    """Say why a candidate is spurious by the gap that it leaves; None where it closes enough or noise hides it."""
+    """Say why a candidate is spurious by the gap that it leaves; None where it closes enough or noise hides it.
+
+    Parameters
+    ----------
+    evidence : for the gap of a damper
+    config : the block diagnose: which gap is significant
+    before : optimum without the candidate
+    candidate : optimum with one more effect
+    """
     if not evidence.gap_is_significant(before, config):
         return None
     checks = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
@@ -85,7 +100,15 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, ca
 
 
 def closes_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate) -> bool:
-    """Whether a candidate leaves so little of the gap that no further effect is looked for."""
+    """Whether a candidate leaves so little of the gap that no further effect is looked for.
+
+    Parameters
+    ----------
+    evidence : for the gap of a damper
+    config : the block diagnose: the share of the gap that may be left, and which gap is negligible
+    before : optimum without the candidate
+    candidate : optimum with one more effect
+    """
     return evidence.gap(candidate.fitted) <= max(config.unexplained_share * evidence.gap(before), config.negligible)
 
 
@@ -443,6 +466,12 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
 
     A law that gives the force of the chosen one by more numbers is none: a branch that never slips is a spring, a mount
     that gives way at once is a play, a gas that does not harden is an offset.
+
+    Parameters
+    ----------
+    chosen : candidate that is adopted in this step
+    tried : candidates of the step, best first, the chosen one among them
+    config : the block diagnose: by how much of BIC a rival may be worse
     """
     others = [
         c

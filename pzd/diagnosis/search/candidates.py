@@ -28,6 +28,16 @@ def sorted_starts(problem: Problem, before: FitResult, effect: Effect) -> list[A
 
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effect : whose starting values are sorted
+
+    Returns
+    -------
+    each (unknowns,) in the units of the search, the smallest misfit first
     """
     starts = starts_of(problem, before, effect)
     if len(starts) == 1:
@@ -80,7 +90,18 @@ def most_promising(
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
-    """Compute the largest drop in misfit that a linearised step promises, from the starts or from near zero."""
+    """Compute the largest drop in misfit that a linearised step promises, from the starts or from near zero.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effect : to be tried
+
+    Returns
+    -------
+    in the unit of the misfit, squares of residuals in units of noise; negative where every step is to the worse
+    """
     starts = starts_of(problem, before, effect)
     share = thresholds.LINEARISED_SHARE
     faint = [towards_neutral(problem, before, effect, start, share) for start in starts]
@@ -91,6 +112,12 @@ def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array
     """Return all combinations of the starting values of an effect, each (unknowns,) in the units of the search.
 
     A parameter with one value per voltage starts alike at all of them, or in proportion to T0.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effect : whose starting values are combined
     """
     unknowns = _new_unknowns(problem, before, effect)
     parameters = {u.parameter.name: u.parameter for u in unknowns}
@@ -106,7 +133,20 @@ def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array
 
 
 def towards_neutral(problem: Problem, before: FitResult, effect: Effect, start: Array, share: float) -> Array:
-    """Return starting values at a share of the way from those that switch the effect off."""
+    """Return starting values at a share of the way from those that switch the effect off.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effect : to be tried
+    start : (unknowns,) in the units of the search
+    share : of the way: 0 switches the effect off, 1 is the start itself
+
+    Returns
+    -------
+    (unknowns,) in the units of the search
+    """
     unknowns = _new_unknowns(problem, before, effect)
     return np.array([u.to_search(u.towards_neutral(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
@@ -234,6 +274,17 @@ def candidate(problem: Problem, before: FitResult, effect: Effect, start: Array 
 
     Others, then ever fainter ones, are tried only while the fit is worse than without the effect: such a search got
     stuck, for being switched off is one of the effect's own values.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    effect : to be fitted
+    start : (unknowns,) in the units of the search; None for those of the effect
+
+    Returns
+    -------
+    the best of the optima reached, with what the effect pays
     """
     problem, reached = problem_for(problem, effect), list[Candidate]()
     starts = sorted_starts(problem, before, effect) if start is None else [start]
@@ -354,7 +405,16 @@ def _fitted_per_voltage(
 def as_candidate(
     problem: Problem, before: FitResult, effect: str, fitted: FitResult, pays: float | None = None
 ) -> Candidate:
-    """Describe an optimum with one more effect than `before` as a candidate; `pays` where its criterion is known."""
+    """Describe an optimum with one more effect than `before` as a candidate; `pays` where its criterion is known.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum without the effect
+    effect : its name
+    fitted : optimum with it
+    pays : change of BIC by it, negative where it pays; None where it is to be computed
+    """
     pairs = zip(before.residuals, fitted.residuals, strict=True)
     return Candidate(
         effect,
@@ -367,7 +427,18 @@ def as_candidate(
 
 
 def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
-    """Search a candidate to its optimum, from all its starting values."""
+    """Search a candidate to its optimum, from all its starting values.
+
+    Parameters
+    ----------
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
+    found : candidate of a shorter search
+
+    Returns
+    -------
+    the best optimum, with one value per voltage where the candidate has such
+    """
     if found.varies:
         return _fitted_per_voltage(problem, before, found.effect, thresholds.MOST_EVALUATIONS_OF_BEST)
     effect = known()[found.effect]
@@ -424,7 +495,17 @@ def delta_bic(before: FitResult, after: FitResult) -> float:
 
 
 def force_change(problem: Problem, before: FitResult, after: FitResult) -> float:
-    """Compute the r.m.s. difference of two simulated forces, each record in units of its peak."""
+    """Compute the r.m.s. difference of two simulated forces, each record in units of its peak.
+
+    Parameters
+    ----------
+    problem : observations, for the peak of each record
+    before, after : optima with the simulated forces, a (n,) array a record [N]
+
+    Returns
+    -------
+    share of peak, over all records alike
+    """
     squares = [
         np.mean((a - b) ** 2) / o.peak**2
         for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)

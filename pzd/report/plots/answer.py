@@ -127,13 +127,13 @@ def closing(context: ReportContext) -> Iterator[Panel]:
         label.set_fontstyle("italic")
     ax.tick_params(axis="y", length=0.0)
     ax.set_ylim(len(rows) - 0.4, -0.6)
-    longest = max(_percent(bar.w_s + LEVEL * (bar.error or 0.0)) for bar in (*held_out, *candidates))
-    strokes = [_percent(value) for bar in held_out for value in bar.each]
+    longest = max(_rms_in_percent(bar.w_s + LEVEL * (bar.error or 0.0)) for bar in (*held_out, *candidates))
+    strokes = [_rms_in_percent(value) for bar in held_out for value in bar.each]
     right = 1.2 * longest if not strokes else max(1.2 * longest, min(1.05 * max(strokes), _MOST_BEYOND * longest))
     ax.set_xlim(0.0, right)
     ax.grid(visible=False, axis="y")
-    texts = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in held_out)
-    also = "; ".join(f"{bar.name} {number(_percent(bar.w_s), 2)} %" for bar in candidates)
+    texts = "; ".join(f"{bar.name} {number(_rms_in_percent(bar.w_s), 2)} %" for bar in held_out)
+    also = "; ".join(f"{bar.name} {number(_rms_in_percent(bar.w_s), 2)} %" for bar in candidates)
     alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on seen tests: {also}." if also else "")
     beyond = sum(stroke > right for stroke in strokes)
     ticks = " Strokes: each test, predicted by a fit to the others." if strokes else ""
@@ -174,19 +174,19 @@ def _candidate_bars(context: ReportContext) -> list[_Bar]:
 
 def _draw_bar(ax: Axes, place: int, bar: _Bar) -> None:
     """Draw a bar, its interval, a stroke for each test, and its length in figures behind them."""
-    length, right = _percent(bar.w_s), _percent(bar.w_s)
+    length, right = _rms_in_percent(bar.w_s), _rms_in_percent(bar.w_s)
     ax.barh(place, length, color=bar.colour, height=_BAR)
     if bar.error is not None:
-        ends = [_percent(max(bar.w_s + side * LEVEL * bar.error, 0.0)) for side in (-1.0, 1.0)]
+        ends = [_rms_in_percent(max(bar.w_s + side * LEVEL * bar.error, 0.0)) for side in (-1.0, 1.0)]
         whisker = [[length - ends[0]], [ends[1] - length]]
         ax.errorbar([length], [place], xerr=whisker, color="black", capsize=3.0, linewidth=1.1)
         right = ends[1]
-    each = [_percent(value) for value in bar.each]
+    each = [_rms_in_percent(value) for value in bar.each]
     ax.plot(each, np.full(len(each), place + 0.5 * _BAR + 0.08), "|", color=MEASURED, markersize=5.0, alpha=0.6)
     ax.annotate(f"{number(length, 2)} %", (right, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
 
 
-def _percent(w_s: float) -> float:
+def _rms_in_percent(w_s: float) -> float:
     """Return the r.m.s. error in % of the r.m.s. force, from W_s, which is the ratio of their squares."""
     return 100.0 * float(np.sqrt(w_s))
 

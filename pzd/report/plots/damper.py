@@ -11,7 +11,7 @@ import numpy as np
 from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.identified import ContinuousVelocityRow, ParameterRow, PeakVelocityRow
 from pzd.damper.model import BaseRow
-from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.quantities import BINGHAM
 from pzd.report.blocks import amount, number, unit_of
 from pzd.report.context import ReportContext
 from pzd.report.drawing import AXIS, Panel, Plot, axes, legend, legend_lines, shades
@@ -118,7 +118,7 @@ def parameters(context: ReportContext) -> Iterator[Panel]:
     if len(set(voltages)) < 2:
         return
     temperatures = sorted({row.temperature_degC for row in final}, key=lambda t: t or 0.0)
-    for quantity in (FRICTION, DAMPING, STIFFNESS):
+    for quantity in BINGHAM:
         labels = f"{context.control.name} [{context.control.unit}]", f"{quantity.symbol} [k{unit_of(quantity.unit)}]"
         figure, ax = axes(*labels, height=2.6, key=int(len(temperatures) > 1))
         for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):

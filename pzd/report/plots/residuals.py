@@ -15,7 +15,7 @@ import numpy as np
 from pzd.artefacts import ParameterRow
 from pzd.identification.condition import identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.quantities import DAMPING, DISPLACEMENT, FORCE, FRICTION, STIFFNESS, VELOCITY
+from pzd.quantities import BINGHAM, DISPLACEMENT, FORCE, VELOCITY
 from pzd.record import Array, Condition, Record, is_constant, voltage_scale
 from pzd.report.blocks import number, unit_of
 from pzd.report.context import ReportContext
@@ -338,7 +338,7 @@ def _fitted_alone_panel(
     colours = dict(zip(levels, shades(len(levels)), strict=True))
     figure: Figure = Figure(figsize=(4.5, 4.6))
     plots = figure.subplots(3, 1, sharex=True)
-    for ax, quantity in zip(plots, (FRICTION, DAMPING, STIFFNESS), strict=True):
+    for ax, quantity in zip(plots, BINGHAM, strict=True):
         for level in levels:
             points = [
                 (value, getattr(test.row, quantity.column))

@@ -16,6 +16,7 @@ import numpy as np
 
 from pzd.record import Array, Mask, clock_fault
 from pzd.rig.files.sheet import FileTable, ReadingStep, Wanted, table_place
+from pzd.rig.preflight.clock import GAP
 from pzd.schema.errors import DataError, counted
 
 DEGREE = 5
@@ -29,8 +30,6 @@ FOLLOWS = 5e-5
 A force with dry friction has more, up to 1/n at n samples a cycle where that is all: its flanks would be guessed, and
 smeared over two samples they pass for a soft oil spring. So a quick displacement is read at the instants of the force.
 """
-GAP = 1.5
-"""Steps of a channel's clock, in median ones, above which samples are lost and none is interpolated."""
 SAME = 1e-9
 """Instants that differ by less [s] are one: recorders count in steps of 1e-7 s and more."""
 

@@ -288,7 +288,7 @@ def _unrounded(time: Array) -> tuple[Array, float] | None:
 # --- All files ---
 
 
-WORTH_A_PROCESS = 2_000_000
+BYTES_WORTH_A_PROCESS = 2_000_000
 """Bytes of files from which they are read by several processes: half a second's work, and a process takes a tenth."""
 
 
@@ -333,7 +333,7 @@ def read(
 
     # What a second logger adds to a layout is told apart by its identity, which another process has not.
     alone = any(entry.beside is not None for entry in entries)
-    worth = sum(file.path.stat().st_size for file in files) > WORTH_A_PROCESS
+    worth = sum(file.path.stat().st_size for file in files) > BYTES_WORTH_A_PROCESS
     store = OnDisk()
     for file, made in zip(files, parallel_each(read_one, files, jobs if worth and not alone else 1), strict=True):
         if isinstance(made, ConfigError):
@@ -404,7 +404,11 @@ def _digest(test: RawRecord, alone: DamperAlone) -> bytes:
 
 
 def _label(test: RawRecord) -> tuple[str | None, tuple[float, ...]]:
-    """Return the setting and the medians of the control signal and the temperature; NaN where there is none."""
+    """Return the setting and the medians of the control signal and the temperature; -273.15 where there is none.
+
+    Reason: labels are compared, and NaN does not equal itself; no test is run at absolute zero, nor with a control
+    signal set to that number.
+    """
     channels = (test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE))
     return test.setting, tuple(-273.15 if values is None else float(np.median(values)) for values in channels)
 

@@ -17,15 +17,12 @@ from pzd.artefacts import Finding, RecordEntry
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.force import best_delay
-from pzd.rig.preflight.reference import ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
+from pzd.rig.preflight.reference import WORTH, ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
 from pzd.rig.preflight.sensors import coarse_step
 from pzd.signals.cycles import MEDIAN_OF_NORMAL
 
-WORTH = 3e-4
-"""Share of the force's squares, beyond noise, from which a low-pass is looked for; the grid of the reference leaves a
-tenth."""
 WORTH_OF_RANGE = 4e-5
-"""The same for a range that ends.
+"""As `WORTH`, beyond noise, for a range that ends.
 
 Reason: half of what is left where friction is half of the peak and a fifth of the peak is missing, so that C is a third
 too low; the grid, once closer, leaves less than a quarter of it."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import Array, Rows
+from pzd.record import MAD_TO_SIGMA, Array, Rows
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
 
@@ -87,7 +87,7 @@ def jumps(test: PreflightRecord) -> Iterator[Finding]:
             ends = np.union1d(_held_then_jumping(values, least), _oddly_long_runs(values))
             moving = np.abs(v) > IN_MOTION * float(np.percentile(np.abs(v), 99.0))
             middle = float(np.median(values))
-            spread = 1.4826 * float(np.median(np.abs(values - middle)))
+            spread = MAD_TO_SIGMA * float(np.median(np.abs(values - middle)))
             ends = ends[moving[ends] | (np.abs(values[ends] - middle) > FAR_OFF * spread)]
         else:
             # A motion may dwell, before the test or in it: only a jump tells that it went on unseen.

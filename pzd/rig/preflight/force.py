@@ -22,7 +22,7 @@ import numpy as np
 from pzd.artefacts import Finding, RecordEntry
 from pzd.record import is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
-from pzd.rig.preflight.reference import LEAST_RESIDUAL, Section, columns, fit_element, reference_fit
+from pzd.rig.preflight.reference import LEAST_RESIDUAL, WORTH, Section, columns, fit_element, reference_fit
 from pzd.rig.preflight.sensors import coarse_step
 
 # --- Offset ---
@@ -124,8 +124,8 @@ SAMPLES = 2.0
 """and the least in samples: the flank of a rigid damper lies between two, and is known to one."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
-WORTH, ALL_BUT = 3e-4, 0.02
-"""Share of the force's squares worth a delay that leaves less than this share of it: less is how coarse the element is.
+ALL_BUT = 0.02
+"""The same where `WORTH` and no more than `LEAST_RESIDUAL` is left: less is how coarse the element is.
 
 Reason: on an oil spring as soft as the delay is long, 20 ms leave 1e-3, which a low-pass explains to a tenth."""
 AS_WELL = 2.0

@@ -33,6 +33,8 @@ BESIDE_REVERSAL = (-1, 0, 1, 2)
 """Samples about a reversal at which the force of a rigid damper is between its two signs."""
 LEAST_RESIDUAL = 2e-3
 """Share of the force's squares worth explaining: less is noise, or how coarse the element is."""
+WORTH = 3e-4
+"""The same for a delay or a low-pass, which has to explain nearly all of it; the grid of the search leaves a tenth."""
 AGAIN = 1e-4
 """Share of the force's squares left at which the search begins again elsewhere: at a C / k on the other side of a
 sample, and at another T0 / k.

@@ -143,7 +143,7 @@ def _mixed(entry: RecordEntry, others: list[RecordEntry]) -> Iterator[Finding]:
         )
 
 
-SAME_MOTION = 0.01
+SAME_RMS = 0.01
 """Relative difference of r.m.s. displacement and speed up to which two tests ran the same motion."""
 ANOTHER_LEVEL = 1.3
 """Ratio of the forces of one motion from which they are of two levels: warming and repeats stay below."""
@@ -185,7 +185,7 @@ def _one_condition(one: RecordEntry, other: RecordEntry) -> bool:
         one.setting == other.setting
         and None in (one.voltage_V, other.voltage_V)
         and (warmth is None or other_warmth is None or abs(warmth - other_warmth) <= SAME_TEMPERATURE)
-        and all(a is not None and b is not None and abs(a - b) <= SAME_MOTION * max(a, b) for a, b in motions)
+        and all(a is not None and b is not None and abs(a - b) <= SAME_RMS * max(a, b) for a, b in motions)
     )
 
 

@@ -92,7 +92,16 @@ def clock_of(config: SimulateConfig) -> Clock:
 def control_spec_of(
     config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, fixed: FixedValues
 ) -> ControlSpec:
-    """Return policy, bounds and fidelity of a case as numbers."""
+    """Return policy, bounds and fidelity of a case as numbers.
+
+    Parameters
+    ----------
+    config : the block simulate
+    case : road, policy and fidelity
+    car : that is ridden, for the gains of a policy of its own state
+    damper : whose friction makes the force jump
+    fixed : voltage and damping that a policy may hold
+    """
     policy, fidelity = case.policy, FIDELITIES[case.fidelity]
     bounds = BY_TABLE
     if fidelity == IDEAL:

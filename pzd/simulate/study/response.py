@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import Response
+from pzd.artefacts.identified import RISE_SHARES
 from pzd.damper.compiled.columns import value_of
 from pzd.damper.compiled.kernels import parallel_forces
 from pzd.damper.compose import respond, steady_force, voltage_at_valve
@@ -23,8 +24,6 @@ from pzd.damper.parameter_rows import base_voltages, parallel_rows
 from pzd.record import Array
 from pzd.simulate.config import SimulateConfig
 
-SHARES = (0.63, 0.9)
-"""Of the whole way."""
 _NOTED = 0.05
 """Share of a step from which on it is worth a word."""
 _STEP = 1e-4
@@ -72,7 +71,7 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
     late = _voltage_reached(damper, motion)
     first, last = (float(steady_force(damper, u, temperature, speed)) for u in (before, after))
     since = time[time >= 0.0]
-    reached = [_when(since, (force - first) / (last - first), share) for share in SHARES]
+    reached = [_when(since, (force - first) / (last - first), share) for share in RISE_SHARES]
     answers: list[tuple[Literal["voltage", "force"], list[float | None]]] = [("voltage", [*late]), ("force", reached)]
     return [
         Response(
@@ -123,12 +122,12 @@ def _voltage_reached(damper: Damper, motion: Motion) -> list[float | None]:
     drive = {name for name in damper.effects if known()[name].place == "drive"}
     if drive <= {"valve_lag"}:
         tau = value_of(damper, "valve_lag", "tau")
-        return [-tau * math.log(1.0 - share) for share in SHARES]
+        return [-tau * math.log(1.0 - share) for share in RISE_SHARES]
     effective = voltage_at_valve(damper, motion.voltage, np.array([_STEP]))
     if effective is None or effective[0] == effective[-1]:
-        return [None for _ in SHARES]
+        return [None for _ in RISE_SHARES]
     progress = (effective - effective[0]) / (effective[-1] - effective[0])
-    return [_when(motion.time[motion.time >= 0.0], progress[motion.time >= 0.0], share) for share in SHARES]
+    return [_when(motion.time[motion.time >= 0.0], progress[motion.time >= 0.0], share) for share in RISE_SHARES]
 
 
 def _when(time: Array, progress: Array, share: float) -> float | None:
