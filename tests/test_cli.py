@@ -785,7 +785,10 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
 
 @pytest.mark.parametrize(
     ("own", "told"),
-    [(0.00007, "noise alone gives 0.0008"), (0.0002, "noise with the zero, gain and delay of each test gives 0.0008")],
+    [
+        (0.00007, "noise alone gives 0.0008"),
+        (0.0002, "noise with the zero, gain and delay that each test may have gives 0.0008"),
+    ],
 )
 def test_the_story_says_where_the_floor_is_not_noise_alone(own: float, told: str) -> None:
     found = diagnosis()

@@ -313,6 +313,12 @@ def visible_gap(checks: Sequence[ResidualCheck]) -> float:
     return _pooled(checks, [c.power / c.peak**2 for c in checks])
 
 
+def gap_with_nuisances(checks: Sequence[ResidualCheck]) -> float:
+    """Compute the same with what a zero, gain and delay of each test would make up for."""
+    squares = [float(np.mean(c.residual[c.wanted] ** 2)) - c.variance for c in checks]
+    return _pooled(checks, [square / c.peak**2 for square, c in zip(squares, checks, strict=True)])
+
+
 def gap_in_force(checks: Sequence[ResidualCheck]) -> float:
     """Compute the r.m.s. gap above the noise [N], pooled over the samples: the tests of large force count most."""
     return _pooled(checks, [c.power for c in checks])

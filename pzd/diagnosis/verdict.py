@@ -25,7 +25,7 @@ from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import polished
 from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples
-from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, visible_gap
+from pzd.diagnosis.gap import ResidualCheck, gap_with_nuisances, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
@@ -152,7 +152,8 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     chances = probability_of_noise(before), probability_of_noise(after)
     if not selection.adopted:
         return _nothing_adopted(sizes[0], chances[0], selection, config)
-    change = f"{' and '.join(selection.adopted)}: {_gap_change(selection, sizes, config)}"
+    whole = gap_with_nuisances(before), gap_with_nuisances(after)
+    change = f"{' and '.join(selection.adopted)}: {_gap_change(selection, sizes, whole, config)}"
     if chances[1] < config.significance and _gap_remains(sizes, config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         return Decision("unexplained", words, None)
@@ -214,10 +215,29 @@ def with_parts_told(decision: Decision, support: Mapping[str, Support]) -> Decis
     return replace(decision, verdict="ambiguous", reason=f"{decision.reason}; but {words}: {why}")
 
 
-def _gap_change(selection: Selection, sizes: tuple[float, float], config: DiagnoseConfig) -> str:
-    """Say what the adopted effects change: the gap, or where noise hid that, the force in their own direction."""
+OWN_SHARE = 2.0
+"""Times as large as the gap that the whole error is from which both are told.
+
+Reason: three quarters of it (mean square) are then what a zero, gain and delay of each test make up for. Not tuned."""
+
+
+def _gap_change(
+    selection: Selection, sizes: tuple[float, float], whole: tuple[float, float], config: DiagnoseConfig
+) -> str:
+    """Say what the adopted effects change: the gap, or where noise hid that, the force in their own direction.
+
+    Parameters
+    ----------
+    selection : effects adopted
+    sizes, whole : gap before and after, and the same with what zero, gain and delay of the tests make up for
+    config : thresholds
+    """
     if sizes[0] >= config.negligible:
-        return f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+        change = f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+        if whole[0] <= OWN_SHARE * sizes[0]:
+            return change
+        error = f"the error falls from {_percent(whole[0])} to {_percent(whole[1])} of peak"
+        return f"{error}; {change} beside what a zero, gain and delay of each test would make up for"
     moved = force_change(selection.final_evidence.whole, selection.baseline, selection.fitted)
     return (
         f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "

@@ -261,6 +261,8 @@ def _clipped_curve(values: Array, knees: tuple[float, ...], stiffness: float, te
 
 DIFFERENCE = 1e-5
 """Step of the difference quotients in search coordinates."""
+LEAST_FRICTION = 1e-3
+"""Least friction by which its step is measured, as a share of the peak force: a smaller one moves no digit of it."""
 EVALUATIONS = 60
 """Most evaluations with slopes in one descent."""
 REFIT_EVALUATIONS = 12
@@ -406,7 +408,9 @@ def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
 def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
     """Return the derivatives (N, p + g) of the force by the natural parameters and the g free terms of the gas."""
     natural = form.natural(curve)
-    steps = DIFFERENCE * np.where(natural > 0.0, natural, tests.peak)
+    size = np.where(natural > 0.0, natural, tests.peak)
+    size[0] = max(size[0], LEAST_FRICTION * tests.peak)  # at its limit of 0 the search leaves a friction of 1e-14 N
+    steps = DIFFERENCE * size
     at = tests.simulated(curve, gas)
     moved = [
         (tests.simulated(form.curve(natural + step * unit), gas) - at) / step

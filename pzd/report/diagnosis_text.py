@@ -142,7 +142,7 @@ def _gap(diagnosis: Diagnosis) -> str:
 def noise_named(gap: Gap) -> str:
     """Return what the noise floor of a gap stands for: noise, and what tests do by themselves where that is visible."""
     own = gap.tests_own > _LEAST_OWN * gap.noise_floor
-    return "noise with the zero, gain and delay of each test" if own else "noise alone"
+    return "noise with the zero, gain and delay that each test may have" if own else "noise alone"
 
 
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:

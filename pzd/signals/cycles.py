@@ -81,8 +81,12 @@ class Cycles:
         return [j for j in range(self.count) if np.all(wanted[number == j])]
 
     def points(self, time: Array) -> int:
-        """Return the number of samples in one cycle, rounded down: the length of a folded cycle."""
-        return max(int(np.floor(self.period / usual_step(time) + 1e-6)), 4)
+        """Return the number of samples in one cycle: the length of a folded cycle.
+
+        Rounded to the nearest: with one point fewer than samples, as rounding down makes of 999.99, the points pass
+        from sample to sample, and the spline between two smooths white noise by a tenth.
+        """
+        return max(round(self.period / usual_step(time)), 4)
 
     @found_once
     def fold(self, time: Array, values: Array) -> Array:

@@ -18,7 +18,14 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import Split, prepare
 from pzd.diagnosis.fit.prediction import predict
-from pzd.diagnosis.gap import ResidualCheck, check_residual, gap_in_force, held_out_criterion, visible_gap
+from pzd.diagnosis.gap import (
+    ResidualCheck,
+    check_residual,
+    gap_in_force,
+    gap_with_nuisances,
+    held_out_criterion,
+    visible_gap,
+)
 from pzd.diagnosis.search.acceptance import leaves_gap
 from pzd.record import Array, Record, sliced
 from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, split_at_gaps
@@ -111,6 +118,9 @@ def test_what_a_gain_of_the_test_takes_stands_beside_the_noise(rng: np.random.Ge
     given = predict(true, prepared, NuisanceConfig().delay_s)
     judged = check_residual(given, prepared, np.ones(record.time.size, np.bool_), NuisanceConfig())
     gap = held_out_criterion([judged], NOBODY)
+    load = np.sqrt(np.mean(record.force**2)) / np.max(np.abs(record.force))
+    assert gap_with_nuisances([judged]) == pytest.approx(abs(1.0 - 1.0 / gain) * load, rel=0.05)
+    assert visible_gap([judged]) < 0.1 * gap_with_nuisances([judged])
     assert gap.tests_own == pytest.approx((1.0 - 1.0 / gain) ** 2, rel=0.05)
     noise = QUIET * np.max(np.abs(record.force))
     assert gap.noise_floor - gap.tests_own == pytest.approx(noise**2 / np.mean(record.force**2), rel=0.1)

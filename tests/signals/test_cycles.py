@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import sawtooth
 
-from pzd.signals.cycles import cycles
+from pzd.signals.cycles import Cycles, cycles
 
 TIME = np.arange(10_000) * 1e-3
 
@@ -108,3 +108,11 @@ def test_folded_cycles_are_the_waveform() -> None:
     assert np.abs(folded - np.sin(start + phase)).max() < 1e-6
     assert run.number(TIME).max() == run.count - 1
     assert np.count_nonzero(run.number(TIME) == 0) == pytest.approx(run.period * 1000, abs=1)
+
+
+@pytest.mark.parametrize("beside", [-1e-5, 0.0, 1e-5])
+def test_white_noise_keeps_its_variance_in_folded_cycles(beside: float, rng: np.random.Generator) -> None:
+    """Also where the period that was found lies a little below or above whole samples."""
+    time = np.arange(10001) / 1000.0
+    folded = Cycles(1.0 + beside, 0.012, 9).fold(time, rng.standard_normal(time.size))
+    assert np.mean(np.diff(folded, axis=0) ** 2) / 2.0 == pytest.approx(1.0, rel=0.06)

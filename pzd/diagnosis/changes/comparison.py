@@ -206,6 +206,7 @@ class Findings:
         if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
             doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
+            doubtful.update(_open(reported))
             told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
             reported = [change for change in reported if change.name not in doubtful]
         unreached = self._not_reached_before(best)
@@ -666,6 +667,10 @@ class Findings:
                 told.append(f"less than {100.0 * noise_share:.2g} % of peak would not be seen beneath the noise")
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
+        if open_ := _open(listed):
+            told.append(
+                f"the interval of {' and '.join(open_)} holds what was before: by how much these tests do not tell"
+            )
         told += self._rivals_told(rivals, named=verdict != "unexplained")
         told += self._left_told(verdict, listed, difference)
         temperatures = self._temperatures()
@@ -768,6 +773,13 @@ def _holds_what_was(change: Change) -> bool:
         np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (change.from_, change.low95, change.high95)
     )
     return bool(np.all((low <= was) & (was <= high)))  # of what no test shows none is held
+
+
+def _open(changes: Sequence[Change]) -> list[str]:
+    """Return the names of changes of the damper all of whose intervals hold the value in the first state."""
+    of_damper = [change for change in changes if change.of == "damper"]
+    differ = {change.name for change in of_damper if not _holds_what_was(change)}
+    return list(dict.fromkeys(change.name for change in of_damper if change.name not in differ))
 
 
 def _as_before(change: Change) -> Unchanged:
