@@ -681,6 +681,30 @@ def temperature_note(base: Sequence[BaseRow], speed: float) -> str:
     return f"; T0, C and k are those of each temperature: {' and '.join(much)} {span}"
 
 
+REACHED = 0.1
+"""Share of the depth to which the other stop is compressed from which a stop counts as reached.
+
+Reason: its force there is a hundredth, which no fit tells from a stop that begins a little further out."""
+
+
+def one_stop_note(damper: Damper, displacements: Sequence[Array]) -> str:
+    """Say where no test came to one of the two stops of an `end_stop`, which its law has at both ends alike.
+
+    Parameters
+    ----------
+    damper : with the stops, about its `zero_m`
+    displacements : of the tests [m]
+    """
+    begins, zero = float(np.max(damper.effects["end_stop"]["x_e"])), damper.zero_m
+    inner, outer = zero - begins, zero + begins
+    into_inner = inner - min(float(np.min(x)) for x in displacements)
+    into_outer = max(float(np.max(x)) for x in displacements) - outer
+    if min(into_inner, into_outer) >= REACHED * max(into_inner, into_outer):
+        return ""
+    other = inner if into_inner < into_outer else outer
+    return f"; one stop alone was reached: whether there is another, as here at x = {other:.3g} m, no test tells"
+
+
 def no_prediction_note(prediction: Prediction | None) -> str:
     """Say where no test could be held out."""
     return "" if prediction else "; there is too little to keep a test back, so that nothing shows what this predicts"

@@ -25,6 +25,7 @@ from pzd.artefacts.diagnosis import Verdict
 from pzd.artefacts.knee import Knees, LawRow
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library, nameable
+from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import data, next_test, thresholds
@@ -59,6 +60,7 @@ from pzd.diagnosis.verdict import (
     no_prediction_note,
     no_slip_diagnosis,
     nuisance_trend,
+    one_stop_note,
     temperature_note,
     with_parts_told,
 )
@@ -128,11 +130,13 @@ def diagnose_setting(
         data.saturation_note(saturated),
         data.drift_note(drift),
     )
-    beside = knee_note(identify.law, decision.verdict, baseline.base)
-    if "temperature_drift" not in selection.adopted:
-        beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
+    beside = knee_note(identify.law, decision.verdict, baseline.base)
+    if "end_stop" in selection.adopted:
+        beside += one_stop_note(final, [each.record.displacement for each in recorded])
+    if "temperature_drift" not in selection.adopted:
+        beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
     diagnosis = Diagnosis(
         verdict=decision.verdict,
         reason="".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before))),
@@ -422,7 +426,34 @@ def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str,
     for (name, parameter_name), sign in CONSTANT_FORCES.items():
         if name in found:
             found[name][parameter_name] = _of_seal_or_valve(found[name][parameter_name], damper, sign)
+    if {"accumulator", "preload_offset"} <= found.keys():
+        found["accumulator"], found["preload_offset"] = _of_any_gas(found["accumulator"], found["preload_offset"])
     return found
+
+
+def _of_any_gas(gas: dict[str, Value], preload: dict[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Return a gas and the preload beside it with intervals that hold those of a gas of any exponent.
+
+    What is constant of the one the other takes up: these tests tell no exponent.
+    """
+    force, length, beside = gas["F_g"], gas["L"], preload["F_0"]
+    if not (isinstance(force.value, float) and isinstance(length.value, float) and isinstance(beside.value, float)):
+        return gas, preload
+    factors = [(1.0, 1.0), *(other_gas(exponent) for exponent in EXPONENTS)]
+    of_force = [(factor - 1.0) * force.value for factor, _ in factors]
+    of_length = [(factor - 1.0) * length.value for _, factor in factors]
+    return (
+        {"F_g": _widened(force, of_force), "L": _widened(length, of_length)},
+        {"F_0": _widened(beside, of_force)},
+    )
+
+
+def _widened(value: Value, moves: Sequence[float]) -> Value:
+    """Return a value with an interval that holds itself moved by each of some amounts."""
+    low, high = value.low95, value.high95
+    if not (isinstance(low, float) and isinstance(high, float)):
+        return value
+    return value.model_copy(update={"low95": low + min(moves), "high95": high + max(moves)})
 
 
 CONSTANT_FORCES = {("preload_offset", "F_0"): 1.0, ("accumulator", "F_g"): -1.0}
@@ -435,11 +466,10 @@ def _of_seal_or_valve(value: Value, damper: Damper, sign: float) -> Value:
     A friction T0 (1 + alpha sign F) has a mean of alpha T0, which one the same both ways, as of a seal, leaves to the
     constant force: at one T0 no test tells them apart.
     """
-    alpha, low, high = damper.effects.get("asymmetry", {}).get("alpha", 0.0), value.low95, value.high95
-    if not (isinstance(alpha, float) and isinstance(low, float) and isinstance(high, float)):
+    alpha = damper.effects.get("asymmetry", {}).get("alpha", 0.0)
+    if not isinstance(alpha, float):
         return value
-    other = sign * alpha * min(row.T0_N for row in damper.base)
-    return value.model_copy(update={"low95": min(low, low + other), "high95": max(high, high + other)})
+    return _widened(value, (0.0, sign * alpha * min(row.T0_N for row in damper.base)))
 
 
 def _value(

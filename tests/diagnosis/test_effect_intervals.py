@@ -172,3 +172,25 @@ def test_a_preload_is_not_surer_than_whether_the_friction_is_asymmetric_as_the_v
     assert estimate.high95 is not None
     assert estimate.low95 <= -20.0 <= estimate.high95
     assert estimate.high95 - estimate.low95 < 25.0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.15, 1.4])
+def test_a_gas_of_any_exponent_lies_in_the_intervals(exponent: float, rng: np.random.Generator) -> None:
+    """Its law differs from the library's by a constant, which a preload takes up: none is sure of the exponent."""
+    force, length = 250.0, 0.11
+    row = BaseRow(T0_N=60.0, C_Ns_per_m=800.0, k_N_per_m=5e6)
+    records = []
+    for frequency, amplitude in ((0.5, 0.02), (0.5, 0.035), (2.0, 0.02), (2.0, 0.035)):
+        test = sine(Damper(base=(row,)), 0.0, frequency, amplitude, rng, noise=0.002, colour=0.0, rate=500.0)
+        gas = -force * (1.0 + test.displacement / length) ** -exponent
+        records.append(replace(test, force=test.force + gas, voltage=None))
+    found = diagnosed(records, forbid=all_but("accumulator", "preload_offset")).diagnosis
+    assert found.effects == ("accumulator", "preload_offset")
+    truth = {"accumulator": {"F_g": force, "L": length}, "preload_offset": {"F_0": 0.0}}
+    for effect, parameters in truth.items():
+        for name, true in parameters.items():
+            value = found.parameters[effect][name]
+            low, high = value.low95, value.high95
+            assert isinstance(low, float)
+            assert isinstance(high, float)
+            assert low <= true <= high, (effect, name, value)

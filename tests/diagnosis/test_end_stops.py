@@ -10,6 +10,7 @@ from numpy.random import Generator
 from synthetic import all_but, diagnosed, sine
 
 from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.verdict import one_stop_note
 from pzd.record import Record
 
 TESTS = ((1.0, 1.0), (1.0, 0.8), (1.4, 1.0), (1.4, 0.8), (0.4, 1.0), (0.4, 0.8))
@@ -46,3 +47,16 @@ def test_tests_that_do_not_reach_a_stop_do_not_contradict_it(_: int, rng: Genera
     # What is missing beside it is largest at the ends of the stroke as well, and draws its beginning inwards.
     begins = found.damper.effects["end_stop"]["x_e"]
     assert begins == pytest.approx(damper.effects["end_stop"]["x_e"], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("zero", "told"),
+    [(0.0, ""), (0.004, "x = 0.03 m"), (-0.004, "x = -0.03 m"), (0.0035, "x = 0.0295 m"), (0.002, "")],
+)
+def test_a_stop_that_no_test_reached_is_told(zero: float, told: str) -> None:
+    """Of stops 26 mm to either side of a zero, by tests from -30 to 30 mm."""
+    row = BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6)
+    damper = Damper(base=(row,), effects={"end_stop": {"k_e": 1e7, "x_e": 0.026}}, zero_m=zero)
+    note = one_stop_note(damper, [np.linspace(-0.03, 0.03, 7), np.linspace(-0.01, 0.01, 7)])
+    assert bool(note) == bool(told)
+    assert told in note

@@ -18,6 +18,8 @@ from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 POLYTROPIC = 1.3
 """Exponent: 1 for isothermal gas, 1.4 for adiabatic nitrogen, which is approached above 1 Hz."""
+EXPONENTS = (1.0, 1.4)
+"""Those of a real gas, from isothermal to adiabatic nitrogen."""
 LEAST = 0.05
 """Smallest share of its volume to which the gas is compressed: beyond L the force is large, not infinite."""
 
@@ -63,3 +65,19 @@ EFFECT = Effect(
 def law(x: float, F_g: float, L: float) -> float:
     """Force [N] parallel to the element at a displacement x [m]: it pushes the rod out."""
     return float(-F_g * max(1.0 + x / L, LEAST) ** -POLYTROPIC)
+
+
+def other_gas(exponent: float) -> tuple[float, float]:
+    """Compute the factors on F_g and L of a gas of another exponent with the same stiffness and the same hardening.
+
+    It differs by a constant force, which a `preload_offset` beside it takes up: tests tell the exponent by that alone.
+
+    Equation: n F_g/L and n (n + 1) F_g/L^2 the same: L'/L = (n' + 1)/(n + 1), F_g'/F_g = n (n' + 1)/(n' (n + 1))
+
+    Examples
+    --------
+    >>> tuple(round(factor, 3) for factor in other_gas(1.0))
+    (1.13, 0.87)
+    """
+    longer = (exponent + 1.0) / (POLYTROPIC + 1.0)
+    return POLYTROPIC / exponent * longer, longer
