@@ -56,6 +56,8 @@ GAS_LENGTHS = (1.0, 100.0)
 """Shortest and longest gas column, in half strokes, whose force and stiffness change together as those of a gas do.
 
 Reason: shorter than the stroke it could not be compressed, and one of a hundred half strokes hardens by a hundredth."""
+GAS_FORCES = ("preload_offset", "gas_spring")
+"""Effects that a change of the gas is told as where they explain it: its force and its stiffness."""
 SHOWN = 0.3
 """Change of a coordinate that must be visible for a quantity to be told unchanged: a third of T0, C, k or the scale of
 an effect. What moves the force by less is not shown by the tests."""
@@ -656,6 +658,7 @@ class Findings:
         if of_damper:
             told.append(f"of the damper: {', '.join(of_damper)}")
             told += [words for name in of_damper if (words := self._kind_of_friction(name))]
+            told += self._gas_before(of_damper)
         elif verdict == "unchanged":
             told.append("nothing of the damper changed visibly")
             if (hidden := self.search.hidden(self.best)) > self.diagnose.visible:
@@ -727,6 +730,16 @@ class Findings:
         if name == "stribeck_friction" and speed > fastest:
             return "stribeck_friction that falls off at no tested speed is dry friction beside the oil spring"
         return None
+
+    def _gas_before(self, of_damper: Sequence[str]) -> list[str]:
+        """Say which gas of the first state a newly told constant force or stiffness adds to."""
+        own = self.first.damper.effects
+        new = [name for name in GAS_FORCES if name in of_damper and name not in own]
+        if not new or "accumulator" not in own or "accumulator" in of_damper:
+            return []
+        force = float(np.mean(own["accumulator"]["F_g"]))
+        adds = "adds" if len(new) == 1 else "add"
+        return [f"{' and '.join(new)} {adds} to the gas of {self.before.name}, an accumulator with F_g = {force:.3g} N"]
 
     def _tests_told(self) -> list[str]:
         """Say how the tests were compared, and which are left out or go where no test of the first state came."""
