@@ -97,6 +97,34 @@ def test_a_call_that_names_no_two_states_is_refused_with_what_to_do(
     assert says in done.stderr
 
 
+@pytest.mark.parametrize("named", [("--from", "new", "--to", "agde"), ("--over", "new,agde")])
+def test_a_name_that_the_config_has_not_is_refused_before_anything_runs(
+    ran: Callable[..., CompletedProcess[str]], tmp_path: Path, named: tuple[str, ...]
+) -> None:
+    done = ran(*named)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"{named[-2]}: no record of the rig has this setting; there is aged, new; did you mean aged?" in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        "[{path: '*.csv', pattern: '(?P<setting>[a-z]+)$'}]",
+        "[{path: new.csv, setting: new}, {path: aged.csv, setting: aged}]",
+    ],
+)
+def test_the_names_of_files_tell_their_settings_before_they_are_read(
+    pzd_here: Callable[..., CompletedProcess[str]], tmp_path: Path, entries: str
+) -> None:
+    for name in ("new", "aged"):
+        (tmp_path / f"{name}.csv").write_text("no recording\n", encoding="utf-8")
+    (tmp_path / "damper.yaml").write_text(f"rig: {{files: {entries}}}\n", encoding="utf-8")
+    done = pzd_here("changes", "damper.yaml", "--from", "new", "--to", "agde", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--to: no record of the rig has this setting; there is aged, new" in done.stderr
+
+
 def test_over_several_settings_each_quantity_has_a_value_a_state_and_a_word_on_its_limits(
     pzd_here: Callable[..., CompletedProcess[str]], tmp_path: Path
 ) -> None:

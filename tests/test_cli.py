@@ -566,6 +566,32 @@ def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     assert rows["sine-comfort-ideal: peak |a_K| at K [m/s2]"] == ["200", "100"]
 
 
+def test_compare_matches_conditions_whatever_the_runs_call_their_setting_and_says_which_damper_it_is(
+    typed: Terminal,
+) -> None:
+    shutil.copy("first.yaml", "second.yaml")
+    typed("run", "first.yaml", "--set", "rig.files.0.setting=gap 0.25 mm")
+    typed("identify", "second.yaml")
+    assert typed("compare", "runs/first", "runs/second") == 0
+    rows = {re.split(r"  +", line)[0]: re.split(r"  +", line)[1:] for line in typed.out[1:]}
+    assert rows["T0 [N], 1 V, 22 degC"] == ["200 (200 to 200)", "200 (200 to 200)"]
+    assert rows["T0, C and k of"] == ["adopted damper", "simple model"]
+    assert len(rows["W_s of the simple model, 1 V, 22 degC"]) == 2
+    assert not any("gap 0.25 mm" in name for name in rows)
+
+
+def test_compare_prints_of_the_comfort_a_w_and_every_measure_where_it_is_asked(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    written = Path("runs/first/6-report/comfort.csv")
+    (head, row, *_) = written.read_text().splitlines()
+    written.write_text("\n".join([head, row, row.replace("a_w", "mtvv")]) + "\n")
+    assert typed("compare", "runs/first") == 0
+    assert [": a_w at" in line for line in typed.out if ": a_w at" in line or "mtvv" in line] == [True]
+    assert "further measures of comfort: --verbose prints them" in typed.out
+    assert typed("compare", "runs/first", "--verbose") == 0
+    assert any(": mtvv at" in line for line in typed.out)
+
+
 def test_compare_writes_a_page_into_the_last_run(typed: Terminal) -> None:
     shutil.copy("first.yaml", "second.yaml")
     typed("run", "first.yaml")

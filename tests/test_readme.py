@@ -21,6 +21,7 @@ import yaml
 from listings import missing
 from scipy.special import ndtri
 
+import pzd
 from pzd.cli.app import status
 from pzd.config import load
 from pzd.damper.effects import library
@@ -150,6 +151,17 @@ def test_the_quick_commands_of_the_readme_run_one_after_the_other(
             if command.endswith("> my.yaml"):
                 with (tmp_path / "my.yaml").open("a", encoding="utf-8") as file:
                     file.write(short)
+
+
+def test_the_damper_of_a_run_predicts_a_motion_as_the_readme_says(
+    clone: Callable[[str], subprocess.CompletedProcess[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(1000) / 500.0
+    names: dict[str, Any] = {"pzd": pzd, "t": time, "x": 0.02 * np.sin(3.0 * np.pi * time)}
+    exec(marked("README.md", "own motion"), names)
+    assert names["force"].shape == time.shape
+    assert 800.0 < np.max(names["force"]) < 2000.0
 
 
 @pytest.fixture

@@ -190,6 +190,11 @@ class Diagnosis(Frozen):
     zero_m: float = 0.0
     """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 
+    @property
+    def by_knee_law(self) -> bool:
+        """Whether the knee law was handed on and no effect looked for; others without a gap are `ambiguous`."""
+        return self.gap is None and not self.ranking and self.verdict != "ambiguous"
+
     @classmethod
     def without_effects(
         cls,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, MountedDampers, RecordEntry
     from pzd.pipeline.run_summary import RunSummary
     from pzd.report.columns import Table
+    from pzd.report.runs_page import ComparedRun
 
 PlotFile = Annotated[
     Path | None,
@@ -183,43 +184,68 @@ def _stale_lines(found: RunSummary, place: str = "") -> list[str]:
 def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbose: Verbose = False) -> int:
     """Print the numbers of several runs side by side, and write a page with their curves over one another.
 
-    The page tells the differences in percent, and which are beyond the intervals; it stands in the folder `compare` of
-    the last run. A stage whose numbers are not those of its config as it is today is called stale, with the reason.
+    Of the comfort of each ride a_w is printed, with --verbose every measure. The page tells the differences in percent,
+    and which are beyond the intervals; it stands in the folder `compare` of the last run. A stage whose numbers are not
+    those of its config as it is today is called stale, with the reason.
     """
-    from pzd.pipeline.run_summary import summary_of
+    from pzd.pipeline.run_summary import compared_runs, summary_of, write_runs_page
     from pzd.report.columns import aligned
 
     output = Output(quiet=quiet, verbose=verbose, as_json=as_json)
     found = [summary_of(folder) for folder in runs]
+    compared = compared_runs(found)
     if as_json:
         output.say_json([_run_as_data(run) for run in found])
-    columns = [dict(_numbers(run)) for run in found]
-    names = dict.fromkeys(name for column in columns for name in column)
+    parameters = dict(_parameters(compared))
+    columns = [
+        {name: cells[one.name] for name, cells in parameters.items() if one.name in cells}
+        | dict(_numbers(run, every_measure=verbose))
+        for run, one in zip(found, compared, strict=True)
+    ]
+    names = dict.fromkeys([*parameters, *(name for column in columns for name in column)])
     head = ["", *(str(run.folder) for run in found)]
     output.say(*aligned([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
+    if not verbose and any(row.measure != "a_w" for run in found for row in run.comfort):
+        output.say("further measures of comfort: --verbose prints them")
     stale = [line for run in found for line in _stale_lines(run, f"{run.folder}: ")]
     output.say(*stale)
     if len({run.folder.resolve() for run in found}) > 1:
-        from pzd.pipeline.run_summary import write_runs_page
-
         marks = [f"not to be trusted: {run.folder}: {mark}" for run in found for mark in run.marks]
-        output.say(f"page: {write_runs_page(found, [*stale, *marks])}")
+        output.say(f"page: {write_runs_page(found, compared, [*stale, *marks])}")
     return DONE
 
 
-def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
-    """Yield names and values of the numbers of a run that are compared with those of others."""
+def _parameters(runs: Sequence[ComparedRun]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the names of T0, C, k and W_s with what each run has, conditions matched as on the page."""
     from pzd.quantities import BINGHAM
     from pzd.report import tables
+    from pzd.report.blocks import typewritten
     from pzd.report.columns import TERMINAL
+    from pzd.report.runs_page import matched
 
-    names = {"W_s", *(quantity.column for quantity in BINGHAM)}
-    parameters = tables.parameters(run.parameters, run.control)
-    compared = [column for column in parameters.columns if column.name in names]
-    for row in run.parameters:
-        for column in compared:
-            head = column.heading(TERMINAL)
-            yield f"{head}, {row.words(run.control) or 'all records'}", column.text(row, TERMINAL)
+    columns = {column.name: column for column in tables.parameters((), runs[0].control).columns}
+    element = [columns[quantity.column] for quantity in BINGHAM]
+    fitted = [run for run in runs if run.parameters]
+    if fitted:
+        yield "T0, C and k of", {run.name: "adopted damper" if run.damper else "simple model" for run in fitted}
+    for rows_of, shown_columns, of in (
+        (lambda run: run.parameters, element, ""),
+        (lambda run: run.identified, [columns["W_s"]], " of the simple model"),
+    ):
+        for place in matched(runs, rows_of):
+            for column in shown_columns:
+                name = f"{column.heading(TERMINAL)}{of}, {typewritten(place.words)}"
+                yield name, {run: column.text(row, TERMINAL) for run, row in place.rows.items()}
+
+
+def _numbers(run: RunSummary, *, every_measure: bool) -> Iterator[tuple[str, str]]:
+    """Yield names and values of the other numbers of a run that are compared with those of others.
+
+    Parameters
+    ----------
+    run : the run
+    every_measure : whether every measure of comfort is wanted, or a_w alone
+    """
     if run.diagnosis is not None:
         yield "verdict", run.diagnosis.verdict
         yield "effects", ", ".join(run.diagnosis.effects) or "-"
@@ -229,7 +255,7 @@ def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     for ride in run.summary:
         yield f"{ride.case}: peak |a_K| at {ride.point} [m/s2]", shown(ride.peak_abs_aK_m_per_s2)
         yield f"{ride.case}: rms a_K at {ride.point} [m/s2]", shown(ride.rms_aK_m_per_s2)
-    for measure in run.comfort:
+    for measure in (row for row in run.comfort if every_measure or row.measure == "a_w"):
         name = f"{measure.case}: {measure.measure} at {measure.point} [{measure.unit}], {measure.edition}"
         yield name, shown(measure.value)
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from pzd.pipeline.execution import InMemory
     from pzd.pipeline.run_summary import RunSummary
     from pzd.runs import Run
 
@@ -64,12 +65,29 @@ class FinishedRun(Result):
 
     @cached_property
     def damper(self) -> Damper:
-        """The adopted damper.
+        """The adopted damper; its `force` predicts that of any motion.
 
         Raises
         ------
         ValueError : when diagnose has not run
         """
+        diagnosed, behind = self._diagnosed
+        return Damper.of(diagnosed.damper, self.found.control, behind)
+
+    @cached_property
+    def baseline(self) -> Damper:
+        """The damper before diagnose, as identified.
+
+        Raises
+        ------
+        ValueError : when diagnose has not run
+        """
+        diagnosed, behind = self._diagnosed
+        return Damper.of(diagnosed.baseline, self.found.control, behind)
+
+    @cached_property
+    def _diagnosed(self) -> tuple[Diagnosed, InMemory]:
+        """Both dampers, and the pipeline that they were found in."""
         from pzd.config import load as load_config
         from pzd.front.pipelines import pipeline_of
         from pzd.runs import CONFIG
@@ -79,10 +97,10 @@ class FinishedRun(Result):
         if self.found.diagnosis is None:
             raise ValueError(f"{self.folder}: diagnose has not run; pzd.run makes it")
         with as_python_errors():
-            control, config = self.found.control, load_config(self.folder / CONFIG)
+            config = load_config(self.folder / CONFIG)
             rig, identified, diagnosed = self.run.read(Rig), self.run.read(Identified), self.run.read(Diagnosed)
         made: dict[str, Artefact] = {Rig.folder: rig, Identified.folder: identified, Diagnosed.folder: diagnosed}
-        return Damper.of(diagnosed.damper, control, pipeline_of(config, made))
+        return diagnosed, pipeline_of(config, made)
 
     @cached_property
     def summary(self) -> pd.DataFrame:

@@ -159,7 +159,7 @@ def summary_of(folder: Path) -> RunSummary:
 
 
 def compared_runs(found: Sequence[RunSummary]) -> tuple[ComparedRun, ...]:
-    """Return what the page of `pzd compare` shows of several runs, each in its setting in use.
+    """Return what `pzd compare` shows of several runs, each in its setting in use.
 
     Raises
     ------
@@ -188,21 +188,27 @@ def _compared(found: RunSummary, name: str) -> ComparedRun:
         run.read(Table).force if Table in has else (),
         tuple(row for row in found.characteristics.peak_velocity if chosen in (None, row.setting)),
         found.comfort,
+        rows,
     )
 
 
-def write_runs_page(found: Sequence[RunSummary], warnings: Sequence[str]) -> Path:
+def write_runs_page(found: Sequence[RunSummary], compared: Sequence[ComparedRun], warnings: Sequence[str]) -> Path:
     """Write the page that compares runs into the folder of the last one, and return its path.
+
+    Parameters
+    ----------
+    found : the runs
+    compared : the same, as the page shows them
+    warnings : why numbers of a run are not those of its config as it is today, or not to be trusted
 
     Raises
     ------
-    DataError : when a file of a run is at fault
     FilesError : when the disk does not take it, or another command is at work in the run
     """
     from pzd.pipeline.state_comparison import comparison_name, write_comparison
     from pzd.report.runs_page import runs_page
 
-    page = runs_page(compared_runs(found), warnings)
+    page = runs_page(compared, warnings)
     run = Run(found[-1].folder, found[-1].folder / CONFIG, found[-1].control)
     name = comparison_name(*(one.folder.resolve().name for one in found), between="--and--")[:_LONGEST_NAME]
     with run.locked("pzd compare"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +15,10 @@ from pzd.diagnosis.changes.over import Followed, blocks_of_cycles, followed_over
 from pzd.diagnosis.changes.state import State, diagnosed_state
 from pzd.identification.stage import identify
 from pzd.pipeline.command import Opened, execute
-from pzd.pipeline.dependencies import setting_of
+from pzd.pipeline.dependencies import setting_of as setting_of_run
 from pzd.pipeline.execution import Say
+from pzd.rig.files.reading import listed
+from pzd.rig.files.sniffing import setting_of
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
 
@@ -43,12 +45,40 @@ class Named:
         """
         if self.setting is None:
             with self.given.placed():
-                return setting_of(self.given.config, self.given.run)
-        entries = self.given.run.read(Rig).entries
+                return setting_of_run(self.given.config, self.given.run)
+        return self._among([entry.setting for entry in self.given.run.read(Rig).entries], option)
+
+    def check(self, option: str) -> None:
+        """Refuse a setting that the config and the names of its files have not, before anything runs.
+
+        Raises
+        ------
+        ConfigError : when there is none of that name
+        """
+        told = _settings_told(self.given)
+        if self.setting is not None and told is not None:
+            self._among(told, option)
+
+    def _among(self, settings: Sequence[str | None], option: str) -> str | None:
         try:
-            return setting_in_use(self.setting, [entry.setting for entry in entries])
+            return setting_in_use(self.setting, settings)
         except ConfigError as error:
             raise ConfigError(f"{option}: {message.partition(': ')[2]}" for message in error.messages) from error
+
+
+def _settings_told(given: Opened) -> list[str | None] | None:
+    """Return the settings that the config and the names of its files tell; None where only reading them does."""
+    rig = given.config.rig
+    if rig is None:
+        return None
+    if rig.virtual is not None:
+        return [entry.setting for entry in rig.virtual]
+    files = rig.files or ()
+    if any(entry.layout is not None or entry.preamble is not None for entry in files):
+        return None
+    with given.placed():
+        found = listed(files, given.run.config.parent)
+    return [setting_of(one.entry.pattern, one.path) or one.entry.setting for one in found]
 
 
 def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared:
@@ -64,6 +94,8 @@ def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared
             f"{other.run.config}: control: must be that of {one.run.config}, {one.run.control.name} in "
             f"{one.run.control.unit} (got {other.run.control.name} in {other.run.control.unit})"
         )
+    before.check("--from")
+    after.check("--to")
     for given in {id(each): each for each in (one, other)}.values():
         execute(given, "identify", force=False, jobs=jobs, say=say)
     settings = before.chosen("--from"), after.chosen("--to")
@@ -98,6 +130,8 @@ def follow_states(given: Opened, over: str, jobs: int, say: Say) -> Followed:
     cut = names == [CYCLES]
     if len(set(names)) < max(len(names), 2) and not cut:
         raise ConfigError(f"--over: needs two settings or more, each once, or `{CYCLES}` (got {over})")
+    for name in () if cut else names:
+        Named(given, name).check("--over")
     execute(given, "identify", force=False, jobs=jobs, say=say)
     config, control = given.config, given.run.control
     with given.placed():

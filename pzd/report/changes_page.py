@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pzd.artefacts.changes import Change, Changes, Course, CourseRow, Numbers, Unchanged
+from pzd.artefacts.changes import Change, Changes, Course, CourseRow, Unchanged
 from pzd.diagnosis.changes.comparison import Compared, ComparedCycle
 from pzd.diagnosis.changes.over import Followed
 from pzd.quantities import Control
@@ -27,6 +27,7 @@ from pzd.report.blocks import (
     sentence,
     spelled,
 )
+from pzd.report.changes_text import SHARES, TOO_SMALL, holds_what_was, value_at, values_at
 from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render
@@ -51,10 +52,11 @@ def changes_page(found: Compared, control: Control) -> str:
     control : the control signal, for its unit
     """
     changes = found.changes
-    cycles = sorted(found.cycles, key=lambda cycle: -_rms(cycle.force_after - cycle.force_before))
+    most = sorted(found.cycles, key=lambda cycle: -_rms(cycle.force_after - cycle.force_before))[:SHOWN]
+    shown = sorted(most, key=_by_control_and_speed)
     with styled():
-        loops = tuple(encoded(_loop(cycle, control)) for cycle in cycles[:SHOWN])
-        differences = tuple(encoded(_difference(cycle, control)) for cycle in cycles[:SHOWN])
+        loops = tuple(encoded(_loop(cycle, control)) for cycle in shown)
+        differences = tuple(encoded(_difference(cycle, control)) for cycle in shown)
         bars = tuple(encoded(panel) for panel in _bars(changes))
     table: list[Block] = [_quantities(changes, control)] if changes.changes or changes.unchanged else []
     sections = [
@@ -96,7 +98,7 @@ def _course_panel(course: Course, row: CourseRow, control: Control) -> Panel:
     places = np.arange(len(course.states))
     for i in range(len(row.at_voltage_V or (None,))):
         middle, low, high = (
-            np.array([np.nan if (v := _at(each, i)) is None else v for each in column])
+            np.array([np.nan if (v := value_at(each, i)) is None else v for each in column])
             for column in (row.values, row.low95, row.high95)
         )
         label = amount(row.at_voltage_V[i], control.unit) if row.at_voltage_V is not None else ""
@@ -159,9 +161,10 @@ def _quantity(each: Change | Unchanged) -> str:
 def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...]]:
     count = len(each.at_voltage_V) if each.at_voltage_V is not None else 1
     name = _quantity(each)
-    share = percent(each.share) if isinstance(each, Change) else DASH
     for i in range(count):
-        start, to, low, high = (_at(values, i) for values in (each.from_, each.to, each.low95, each.high95))
+        start, to, low, high = values_at(each, i)
+        same = TOO_SMALL if holds_what_was(each, i) is False else DASH
+        share = percent(each.share) if isinstance(each, Change) else same
         change = None if start is None or to is None else to - start
         relative = None if change is None or not start else change / abs(start)
         at = amount(each.at_voltage_V[i], control.unit) if each.at_voltage_V is not None else DASH
@@ -172,22 +175,24 @@ def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...
         )  # fmt: skip
 
 
-def _at(values: Numbers, index: int) -> float | None:
-    return values[index] if isinstance(values, tuple) else values
-
-
 def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
-    """Return force at peak velocity, as the trade reads it: rebound and compression before, after, and in %."""
+    """Return force at peak velocity, as the trade reads it: in rebound and compression, and by how many % it grew."""
     header = ("test", control.name, "velocity", "rebound before", "after", "%", "compression before", "after", "%")
     rows = []
-    for cycle in sorted(cycles, key=lambda c: (c.voltage or 0.0, float(np.max(c.velocity)))):
+    for cycle in sorted(cycles, key=_by_control_and_speed):
         cells = []
         for at in (int(np.argmax(cycle.velocity)), int(np.argmin(cycle.velocity))):
             before, after = float(cycle.force_before[at]), float(cycle.force_after[at])
-            cells += [amount(before, "N"), amount(after, "N"), percent((after - before) / abs(before))]
+            cells += [amount(before, "N"), amount(after, "N"), percent(_growth(before, after))]
         at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
         rows.append((cycle.after, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
-    return TextTable("Force at the peak velocity of each test", *_without_control_where_none(header, rows))
+    title = "Force at the peak velocity of each test; in % by how much its magnitude grew, a dash where the sign turned"
+    return TextTable(title, *_without_control_where_none(header, rows))
+
+
+def _growth(before: float, after: float) -> float | None:
+    """Return by what share the magnitude of a force grew; None where its sign turned, or it was 0."""
+    return abs(after) / abs(before) - 1.0 if before * after > 0.0 else None
 
 
 # --- Pictures
@@ -228,8 +233,12 @@ def _bars(changes: Changes) -> Iterator[Panel]:
         figure,
         "Share of each change",
         "Share of the mean square of the difference that is left without each change.",
-        "What is left without each, the others fitted again.",
+        sentence(SHARES),
     )
+
+
+def _by_control_and_speed(cycle: ComparedCycle) -> tuple[float, float]:
+    return cycle.voltage or 0.0, float(np.max(cycle.velocity))
 
 
 def _name(cycle: ComparedCycle, control: Control) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pzd.artefacts.changes import Change, Changes, Course, Unchanged
+    from pzd.artefacts.changes import Change, Changes, Course, Numbers, Unchanged
     from pzd.quantities import Control
 
 _VERDICTS = {
@@ -16,6 +16,12 @@ _VERDICTS = {
     "ambiguous": "several changes fit the difference",
     "unexplained": "a part of the difference has no name",
 }
+SHARES = "what is left without each, the others fitted again"
+"""What the shares of the changes are."""
+TOO_SMALL = "too small to matter"
+"""Of an unchanged quantity whose interval leaves its first value out: the force does not show it visibly."""
+_WHOLE = 1.005
+"""Sum of the shares from which on the terminal says why they are more than 100 %: below it they round to it."""
 
 
 def changes_lines(found: Changes, control: Control) -> Iterator[str]:
@@ -29,6 +35,8 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
             yield f"{title}:"
         for row in rows:
             yield from (f"  {line}" for line in _lines(row, control))
+        if title == "changed" and sum(change.share for change in found.changes) > _WHOLE:
+            yield f"  shares: {SHARES}; so they come to more than 100 % together"
     if found.next_test:
         yield next_test_line(found.next_test, control.unit)
 
@@ -42,14 +50,30 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
     if share and len(nodes) > 1:
         yield f"{name} at {len(nodes)} control signals together{share}"
     for i, node in enumerate(nodes):
-        start, to, low, high = (
-            values[i] if isinstance(values, tuple) else values for values in (row.from_, row.to, row.low95, row.high95)
-        )
+        start, to, low, high = values_at(row, i)
         at = "" if node is None else f" at {TERMINAL.amount(node, control.unit)}"
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
-        as_it_was = start is not None and low is not None and high is not None and low <= start <= high
-        told = (", as it was" if share and as_it_was else "") if len(nodes) > 1 else share
+        if share:
+            told = share if len(nodes) == 1 else ", as it was" if holds_what_was(row, i) else ""
+        else:
+            told = f", {TOO_SMALL}" if holds_what_was(row, i) is False else ""
         yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{told}"
+
+
+def values_at(row: Change | Unchanged, index: int) -> tuple[float | None, ...]:
+    """Return a quantity before and after, and the ends of its interval, at one of its control signals."""
+    return tuple(value_at(values, index) for values in (row.from_, row.to, row.low95, row.high95))
+
+
+def value_at(values: Numbers, index: int) -> float | None:
+    """Return a value at one of the control signals of a quantity."""
+    return values[index] if isinstance(values, tuple) else values
+
+
+def holds_what_was(row: Change | Unchanged, index: int) -> bool | None:
+    """Tell whether the interval of a quantity holds its first value, at one of its control signals; None without."""
+    start, _, low, high = values_at(row, index)
+    return None if start is None or low is None or high is None else low <= start <= high
 
 
 def course_lines(found: Course, control: Control) -> Iterator[str]:

@@ -98,7 +98,7 @@ def headline(diagnosis: Diagnosis) -> str:
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
     if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and not _confident(diagnosis.confidence):
         return _DOUBTFUL[diagnosis.verdict]
-    if diagnosis.verdict == "unexplained" and diagnosis.gap is None and not diagnosis.ranking:
+    if diagnosis.verdict == "unexplained" and diagnosis.by_knee_law:
         return "the law that was fitted leaves a gap, and no effect was looked for beside it"
     if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
@@ -127,7 +127,7 @@ def _open_names(diagnosis: Diagnosis) -> str:
 def _gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap is None:
-        return "gap: could not be measured"
+        return f"gap: {no_gap(diagnosis)}"
     share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
     records = counted(len(gap.held_out), "record")
     held_out = {"records": records, "mixed": f"{records}, whole or in part"}.get(
@@ -137,6 +137,11 @@ def _gap(diagnosis: Diagnosis) -> str:
         f"gap on what no fit has seen ({held_out}): W_s {shown(gap.before)} before, {shown(gap.after)} after"
         f"{share}; {noise_named(gap)} gives {shown(gap.noise_floor)}"
     )
+
+
+def no_gap(diagnosis: Diagnosis) -> str:
+    """Return why there is no gap, as words behind it."""
+    return "not looked for under the knee law" if diagnosis.by_knee_law else "could not be measured"
 
 
 def noise_named(gap: Gap) -> str:

@@ -59,7 +59,7 @@ def explorer(context: ReportContext) -> Explorer | None:
     every = context.tests.records
     if not every:
         return None
-    records = every[:: -(-len(every) // _MOST_TESTS)]
+    records = context.tests.by_motion(every[:: -(-len(every) // _MOST_TESTS)])
     most = min(_MOST_SAMPLES, _ALL_SAMPLES // len(records))
     curves = [("measured", "measured"), ("baseline", context.damper.baseline_name)]
     curves += [("final", "with what was missing")] if context.damper.extended else []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.artefacts import Finding, ForceRow, Gap, RecordEntry, Rig, SummaryRow
+from pzd.artefacts import Diagnosis, Finding, ForceRow, RecordEntry, Rig, SummaryRow
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -33,7 +33,7 @@ from pzd.report.blocks import (
 )
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
-from pzd.report.diagnosis_text import noise_named
+from pzd.report.diagnosis_text import no_gap, noise_named
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, encoded, pictures, styled
 from pzd.report.explorer import Explorer, policy, scripts
 from pzd.report.explorer import explorer as explorer_of
@@ -71,6 +71,7 @@ def _damper(context: ReportContext) -> Card:
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
     at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
+    at += ", by the model in steady flow"
     rest = context.damper.static_force_in_words((low.voltage_V, high.voltage_V))
     at += f"; {rest} of it act at rest as well." if rest else "."
     if low.voltage_V == high.voltage_V:
@@ -113,13 +114,25 @@ def _capital(text: str) -> str:
 
 def _confidence(context: ReportContext) -> Card:
     diagnosis = context.diagnosed.diagnosis
-    sure = percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated"
-    return Card("How sure is that?", sure, _gap(diagnosis.gap))
+    question, gap = "How sure is that?", _gap(diagnosis)
+    if diagnosis.confidence is not None:
+        return Card(question, percent(diagnosis.confidence), gap)
+    return Card(question, "Not stated", f"{_unsure(diagnosis)} {gap}")
 
 
-def _gap(gap: Gap | None) -> str:
+def _unsure(diagnosis: Diagnosis) -> str:
+    """Return why no confidence is stated."""
+    if diagnosis.by_knee_law:
+        return "The knee law is handed on as it was fitted, and no effect was tried beside it."
+    if not diagnosis.ranking:
+        return "No effect was tried on these tests."
+    return "A probability is that of a name, and what is left has none."
+
+
+def _gap(diagnosis: Diagnosis) -> str:
+    gap = diagnosis.gap
     if gap is None:
-        return "The gap could not be measured."
+        return f"The gap {'was ' * diagnosis.by_knee_law}{no_gap(diagnosis)}."
     before, after = number(gap.before), number(gap.after)
     course = f"stays {before}" if gap.after == gap.before else f"goes from {before} to {after}"
     return f"The gap W_s on held-out data {course}; {noise_named(gap)} is {number(gap.noise_floor)}."
@@ -241,8 +254,9 @@ def answer(context: ReportContext) -> str:
     noise = noise_named(gap)
     on = "on tests that no fit has seen" if gap.hold_out == "records" else "on data that no fit has seen"
     if not context.damper.extended or gap.after == gap.before:
-        return f"{text}: its error {on} is {before} of the force, and {noise} would leave {least}."
-    return f"{text}: with it the error {on} falls from {before} to {after} of the force; {noise} leaves {least}."
+        return f"{text}: its error {on} is {before} of the force, r.m.s., and {noise} would leave {least}."
+    falls = f"falls from {before} to {after} of the force, r.m.s."
+    return f"{text}: with it the error {on} {falls}; {noise} leaves {least}."
 
 
 def told(context: ReportContext) -> tuple[str, ...]:

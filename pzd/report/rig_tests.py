@@ -93,10 +93,24 @@ class RigTests:
 
     def motion(self, record: Record) -> str:
         """Return frequency and amplitude of a record; its name where it does not repeat or holds several tests."""
+        found = self._swing(record)
+        return ", ".join((amount(found[0], "Hz"), amount(1000.0 * found[1], "mm"))) if found else record.name
+
+    def by_motion(self, records: Sequence[Record]) -> list[Record]:
+        """Return records by frequency, amplitude and control signal, those that do not repeat last, as they came."""
+
+        def key(one: Record) -> tuple[float, float, float]:
+            swing = self._swing(one)
+            return (*swing, self.level(one) or 0.0) if swing else (math.inf, math.inf, 0.0)
+
+        return sorted(records, key=key)
+
+    def _swing(self, record: Record) -> tuple[float, float] | None:
+        """Return frequency [Hz] and amplitude [m]; None where a record does not repeat or holds several tests."""
         found = [m for m in self.identified.measures if m.record == record.name]
         if len(found) != 1 or found[0].frequency_Hz is None:
-            return record.name
-        return f"{amount(found[0].frequency_Hz, 'Hz')}, {amount(1000.0 * found[0].amplitude_m, 'mm')}"
+            return None
+        return found[0].frequency_Hz, found[0].amplitude_m
 
     def labels(self, records: Sequence[Record]) -> list[str]:
         """Return each test by its motion and conditions, with its name where others have the same or it has no motion.

@@ -57,6 +57,8 @@ class ComparedRun:
     """Of the table."""
     peak_velocity: tuple[PeakVelocityRow, ...]
     comfort: tuple[ComfortRow, ...]
+    identified: tuple[ParameterRow, ...] = ()
+    """As identify found them, for how far the simple model is off."""
 
 
 def beyond(one: Estimate, other: Estimate) -> bool | None:
@@ -120,9 +122,11 @@ _RIDES = "A ride has no interval: it follows from its damper, so that a differen
 
 
 @dataclass(frozen=True)
-class _Matched:
+class Matched:
     """One condition of several runs."""
 
+    setting: str | None
+    """None where no run has several."""
     voltage: float | None
     temperature: float | None
     unit: str
@@ -131,27 +135,41 @@ class _Matched:
 
     @property
     def words(self) -> str:
-        parts = [amount(self.voltage, self.unit)] if self.voltage is not None else []
+        """The condition as the page names it."""
+        parts = [self.setting] if self.setting is not None else []
+        parts += [amount(self.voltage, self.unit)] if self.voltage is not None else []
         parts += [amount(self.temperature, "degC")] if self.temperature is not None else []
         return ", ".join(parts) or "one condition"
 
 
-def _matched(runs: Sequence[ComparedRun], rows_of: Callable[[ComparedRun], Sequence[Any]]) -> list[_Matched]:
-    """Match the conditions of runs, as `identify.group` matches records by default; sorted by the control signal."""
+def matched(runs: Sequence[ComparedRun], rows_of: Callable[[ComparedRun], Sequence[Any]]) -> list[Matched]:
+    """Match the conditions of runs, as `identify.group` matches records by default; sorted by the control signal.
+
+    What a run calls its setting says nothing of another run, and counts only where one has several.
+    """
     every = [row.voltage_V for run in runs for row in rows_of(run) if row.voltage_V is not None]
     within = CONSTANT_SHARE * max(max(every) - min(every), *map(abs, every)) if every else 0.0
-    found: list[_Matched] = []
+    several = any(len({_setting(row) for row in rows_of(run)}) > 1 for run in runs)
+    found: list[Matched] = []
     for run in runs:
         unit = run.control.unit
         for row in rows_of(run):
+            setting = _setting(row) if several else None
             for place in found:
-                same = unit == place.unit and _near(row.voltage_V, place.voltage, within)
+                same = (unit, setting) == (place.unit, place.setting) and _near(row.voltage_V, place.voltage, within)
                 if same and _near(row.temperature_degC, place.temperature, SAME_TEMPERATURE):
                     place.rows.setdefault(run.name, row)
                     break
             else:
-                found.append(_Matched(row.voltage_V, row.temperature_degC, unit, {run.name: row}))
-    return sorted(found, key=lambda place: (place.unit, place.voltage or 0.0, place.temperature or 0.0))
+                found.append(Matched(setting, row.voltage_V, row.temperature_degC, unit, {run.name: row}))
+    return sorted(
+        found,
+        key=lambda place: (place.unit, place.setting or "", place.voltage or 0.0, place.temperature or 0.0),
+    )
+
+
+def _setting(row: Any) -> str | None:
+    return getattr(row, "setting", None)
 
 
 def _near(one: float | None, other: float | None, within: float) -> bool:
@@ -205,7 +223,7 @@ def _difference_column(run: str, first: str) -> Column:
 
 def _parameter_tables(runs: Sequence[ComparedRun]) -> Iterator[Table]:
     """Yield T0, C and k by condition."""
-    places = _matched(runs, lambda run: run.parameters)
+    places = matched(runs, lambda run: run.parameters)
     for parameter in BINGHAM:
         rows = [
             _Row(place.words, {run: Estimate.of(row, parameter.column) for run, row in place.rows.items()})
@@ -296,10 +314,10 @@ class _Curve:
     """(m,) velocity [m/s] and (m,) force [N]."""
 
 
-def _levels(runs: Sequence[ComparedRun]) -> list[_Matched]:
+def _levels(runs: Sequence[ComparedRun]) -> list[Matched]:
     """Return the curves of the runs by control value: those that most runs share first, then by control value."""
     curves = {run.name: tuple(_curves_of(run)) for run in runs}
-    return sorted(_matched(runs, lambda run: curves[run.name]), key=lambda place: -len(place.rows))
+    return sorted(matched(runs, lambda run: curves[run.name]), key=lambda place: -len(place.rows))
 
 
 def _curves_of(run: ComparedRun) -> Iterator[_Curve]:
@@ -332,7 +350,7 @@ def _nearest(levels: Sequence[float | None], voltage: float | None) -> float | N
     return min(known, key=lambda level: abs(level - voltage)) if known and voltage is not None else None
 
 
-def _difference(place: _Matched, first: str, other: str) -> Array:
+def _difference(place: Matched, first: str, other: str) -> Array:
     """Return the force of another run less that of the first, at the velocities of the first [N]; NaN beyond.
 
     Force jumps at v = 0, where both one-sided rows stand, so that each side is interpolated by itself.
@@ -347,7 +365,7 @@ def _difference(place: _Matched, first: str, other: str) -> Array:
     return apart
 
 
-def _curves(runs: Sequence[ComparedRun], place: _Matched) -> Panel:
+def _curves(runs: Sequence[ComparedRun], place: Matched) -> Panel:
     present = [(run, colour) for run, colour in zip(runs, _colours(len(runs)), strict=True) if run.name in place.rows]
     if len(present) == 1:
         figure, upper = axes("velocity [m/s]", "force [kN]", height=3.9)

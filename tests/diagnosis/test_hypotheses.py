@@ -20,7 +20,7 @@ from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.hypotheses import hypotheses, proposal_of
 from pzd.diagnosis.hypotheses.regression import residuals_of
-from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
+from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, Signals, lagging, play
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.report.diagnosis_text import diagnosis_lines
@@ -269,3 +269,21 @@ def test_a_play_follows_the_rod_once_it_is_taken_up() -> None:
     assert ahead[150] == pytest.approx(0.01)
     assert ahead[-1] == pytest.approx(-0.01)
     assert np.all(np.abs(np.diff(ahead)) <= np.abs(np.diff(x)) + 1e-15)
+
+
+@pytest.mark.parametrize(("rises", "says"), [(1.0, "closes with the time in a stroke"), (-1.0, "opens with the time")])
+def test_a_valve_that_closes_in_a_stroke_has_the_lag_above_zero_and_one_that_opens_below(
+    rises: float, says: str
+) -> None:
+    """Strokes of one speed there and back, whose damping rises or falls from 3000 N s/m over some 30 ms."""
+    t = np.arange(2000) / 1000.0
+    v = np.where(t % 0.4 < 0.2, 0.1, -0.1)
+    x = np.cumsum(v) / 1000.0
+    force = (3000.0 - rises * 1000.0 * np.exp(-(t % 0.2) / 0.03)) * v
+    zero = np.zeros(t.size)
+    signals = Signals(t=t, x=x, v=v, a=zero, F=force, U=zero, T=zero, half_stroke=0.01)
+    (lag,) = [shape for shape in SHAPES if shape.columns is lagging]
+    column = dict(lag.columns(signals))[0.03]
+    coefficient = float(np.linalg.lstsq(np.column_stack([v, column]), force, rcond=None)[0][1])
+    assert np.sign(coefficient) == rises
+    assert says in lag.physics_of(coefficient)

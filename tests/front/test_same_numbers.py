@@ -116,6 +116,7 @@ def test_a_run_is_loaded_as_it_was_written(run: Path, found) -> None:
         pd.testing.assert_frame_equal(frame, as_written(run / file), check_exact=True, check_dtype=False)
     assert loaded.diagnosis.verdict == found.verdict
     assert loaded.damper.model == found.damper.model
+    assert loaded.baseline.model == found.baseline.model != loaded.damper.model
     pd.testing.assert_frame_equal(
         pzd.table(loaded.damper).to_frame(), pzd.table(found.damper).to_frame(), check_exact=True
     )

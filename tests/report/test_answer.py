@@ -31,7 +31,7 @@ def test_the_sentence_names_what_is_missing_and_how_far_the_error_falls(run: Any
     said = answer(context_of(run)).replace("\xa0", " ")
     assert said == (
         "The simple model lacks turbulent flow through a sharp orifice (97 % sure): with it the error on tests that no "
-        "fit has seen falls from 11 % to 3 % of the force; noise alone leaves 2.8 %."
+        "fit has seen falls from 11 % to 3 % of the force, r.m.s.; noise alone leaves 2.8 %."
     )
 
 

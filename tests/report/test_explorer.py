@@ -74,6 +74,20 @@ def test_measured_force_and_both_models_are_those_of_the_record(page: str, run: 
             assert np.array(test[name]) == pytest.approx(values[rows], abs=1e-4 * float(np.abs(values).max()))
 
 
+def test_tests_stand_by_frequency_then_amplitude_then_control_and_those_that_do_not_repeat_last(
+    run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
+    of = run.identified.measures[0]
+    swings = {"r01": (2.0, 0.01), "r02": (1.5, 0.02), "r03": (1.5, 0.01)}
+    measured = tuple(
+        of.model_copy(update={"record": name, "frequency_Hz": f, "amplitude_m": a}) for name, (f, a) in swings.items()
+    )
+    told = replace(run, identified=replace(run.identified, measures=measured)).told()
+    labels = [test["label"].replace("\u00a0", " ").rpartition(", 22")[0] for test in data_of(told.page)["tests"]]
+    assert labels == ["1.5 Hz, 10 mm, 150 V", "1.5 Hz, 20 mm, 0 V", "2 Hz, 10 mm, 150 V", "r00, 0 V"]
+
+
 def test_tests_that_are_alike_are_told_apart_by_their_names_cut_where_they_are_long(
     run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

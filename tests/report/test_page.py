@@ -307,6 +307,27 @@ def test_every_verdict_has_its_words(words_only: None, run: Any, changes: dict[s
         assert "None is proposed" in read.text
 
 
+def test_why_nobody_says_how_sure_a_verdict_is_stands_beside_it(words_only: None, run: Any) -> None:
+    without: dict[str, Any] = {"effects": (), "parameters": {}, "confidence": None}
+    for changes, said in (
+        ({"verdict": "unexplained"}, "Not stated A probability is that of a name, and what is left has none."),
+        ({"verdict": "ambiguous", "gap": None, "ranking": ()}, "Not stated No effect was tried on these tests."),
+    ):
+        assert said in Reader(run.with_diagnosis(**without, **changes).told().page).text
+
+
+def test_each_share_of_the_force_says_what_it_is_a_share_of(words_only: None, run: Any) -> None:
+    reason = "orifice_quadratic: the gap falls from 1 % to 0 % of peak"
+    counted = run.with_diagnosis(run.diagnosed.damper, reason=reason)
+    read = Reader(counted.told().page)
+    assert "of the force, r.m.s.; noise alone leaves" in read.text
+    assert "A gap in % of peak is its r.m.s. above the noise, beside the peak force" in read.text
+    assert "A gap in % of peak" not in Reader(run.told().page).text
+    assert "Where the gap lies; regions overlap, and so do their shares" in read.text
+    assert "T0 is neither the friction that tests show without a model" in read.text
+    assert "In rebound at 0.377 m/s and 22 °C, by the model in steady flow." in read.text.replace("\xa0", " ")
+
+
 def test_what_came_in_for_its_prediction_is_not_said_to_be_in_the_damper(words_only: None, run: Any) -> None:
     known = Support(share=0.6, folds_better=4, folds=4, replaced_by=None, confidence=0.99, sure="certain")
     added = known.model_copy(update={"share": 0.1, "sure": "open", "added": True})
@@ -472,7 +493,7 @@ def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any, read: 
 
     without, text = (page.text.replace("\xa0", " ") for page in (read, Reader(charged.told().page)))
     assert forces(text) == [pytest.approx(force + 90.0, rel=5e-3) for force in forces(without)]
-    assert "In rebound at 0.377 m/s and 22 °C; 90 N of it act at rest as well." in text
+    assert "In rebound at 0.377 m/s and 22 °C, by the model in steady flow; 90 N of it act at rest as well." in text
     told = "ith the 90 N at rest that the table (4-table) leaves out"
     assert [text.count(f"{start}{told}") for start in "wW"] == [1, 1]
     assert "leaves out" not in without

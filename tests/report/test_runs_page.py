@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from html import unescape
 
 import numpy as np
@@ -13,7 +14,7 @@ from pzd.artefacts.identified import PeakVelocityRow
 from pzd.damper.compose import steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
-from pzd.report.runs_page import ComparedRun, beyond, runs_page
+from pzd.report.runs_page import ComparedRun, beyond, matched, runs_page
 
 VELOCITIES = np.concatenate([-np.linspace(0.4, 0.0, 9), np.linspace(0.0, 0.4, 9)])
 
@@ -130,6 +131,22 @@ def test_voltages_of_a_supply_that_scatters_are_one_and_those_of_another_signal_
     ampere = text_of(compared("a", 300.0), compared("b", 300.0, control=Control("current", "A")))
     assert ampere.count("Force over velocity at ") == 4
     assert "100 A" in ampere
+
+
+def test_settings_count_where_a_run_has_several_and_none_is_lost() -> None:
+    one, other = compared("a", 300.0), compared("b", 300.0)
+
+    def at(run: ComparedRun, *settings: str) -> ComparedRun:
+        rows = [row for row in run.parameters if isinstance(row, ParameterRow)]
+        return replace(run, parameters=tuple(row.model_copy(update={"setting": s}) for s in settings for row in rows))
+
+    def places(*runs: ComparedRun) -> list[tuple[str | None, float | None, list[str]]]:
+        return [(p.setting, p.voltage, list(p.rows)) for p in matched(runs, lambda run: run.parameters)]
+
+    assert places(at(one, "soft"), other) == [(None, 0.0, ["a", "b"]), (None, 100.0, ["a", "b"])]
+    assert places(at(one, "soft", "hard"), at(other, "soft")) == [
+        ("hard", 0.0, ["a"]), ("hard", 100.0, ["a"]), ("soft", 0.0, ["a", "b"]), ("soft", 100.0, ["a", "b"]),
+    ]  # fmt: skip
 
 
 def test_a_run_without_a_table_is_told_by_its_parameters_alone() -> None:

@@ -16,6 +16,7 @@ from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.report import tables
 from pzd.report.columns import TERMINAL
+from pzd.report.diagnosis_text import diagnosis_lines
 
 PLACE = {"setting": "gap 0.25 mm", "voltage_V": 0.0, "temperature_degC": 22.0}
 VALUES = {
@@ -117,6 +118,14 @@ def words_only() -> Iterator[None]:
 def page(run, words_only: None, tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("page")
     return with_knee(run).told(folder=folder).page
+
+
+def test_under_the_knee_law_no_gap_was_looked_for_in_the_terminal_and_on_the_page(page: str, run: Any) -> None:
+    lines = diagnosis_lines(with_knee(run).diagnosed.diagnosis, Control())
+    assert "gap: not looked for under the knee law" in lines
+    assert "The gap was not looked for under the knee law." in page
+    assert "The knee law is handed on as it was fitted, and no effect was tried beside it." in page
+    assert "could not be measured" not in page
 
 
 def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction(page: str) -> None:

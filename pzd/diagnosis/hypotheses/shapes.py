@@ -283,8 +283,11 @@ SHAPES: tuple[Shape, ...] = (
            lambda s: np.abs(s.F) * np.sign(s.v)),
     _shape("dF/dt", "s", "a force that comes late or early", _DUYM, lambda s: s.force_rate, library=("sensor_delay",)),
     _shape("|dF/dt|", "s", "a force that comes late one way alone", _DUYM, lambda s: np.abs(s.force_rate)),
-    Shape("(v behind a lag - v)", "N s/m", "damping that comes late, as a softer oil spring or mount gives",
-          _DUYM, lagging, "tau", "s"),
+    Shape("(v behind a lag - v)", "N s/m",
+          "damping that comes late, as a softer oil spring or mount gives, or a frequency-selective valve that closes "
+          "with the time in a stroke", _DUYM, lagging, "tau", "s",
+          below_zero="damping that comes early, as a stiffer oil spring gives, or a frequency-selective valve that "
+          "opens with the time in a stroke"),
     Shape("(x behind a play)/r", "N", "a spring that slips, whatever the speed, as a rubber seat does",
           "Al-Bender, Lampaert and Swevers 2005, IEEE Trans. Automatic Control 50(11)", behind_play, "r", "m",
           library=("second_branch",)),

@@ -15,6 +15,11 @@ from pzd.report.columns import Beyond, Cell, Column, Span, Table
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words
 
+_FRICTIONS = (
+    "T0 is neither the friction that tests show without a model, which is extrapolated to rest where none is slow, nor "
+    "the force at zero velocity of a test, in which is what the oil spring still holds where the stroke turns."
+)
+
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """Return the section on the damper itself."""
@@ -47,7 +52,7 @@ def _intro(context: ReportContext) -> str:
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
         "noise and for a gain, offset and delay of the sensors that differ from test to test. A value that the data do "
-        f"not determine is left out, and the status says so.{beside}"
+        f"not determine is left out, and the status says so.{beside} {_FRICTIONS}"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.artefacts import Diagnosis, Gap, Hypotheses, HypothesisRow, NextTest, Ranked
+from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, NextTest, Ranked
 from pzd.artefacts.csv_rows import Estimate
 from pzd.damper.confounders import known
 from pzd.quantities import Control
@@ -25,7 +25,7 @@ from pzd.report.blocks import (
 from pzd.report.columns import PAGE, Column, Quantity, Table
 from pzd.report.context import ReportContext
 from pzd.report.damper_models import effect_in_words, effects_in_words
-from pzd.report.diagnosis_text import UNNAMED_FORCE, noise_named
+from pzd.report.diagnosis_text import UNNAMED_FORCE, no_gap, noise_named
 
 MIDDLE_DIGITS = 6
 """Of the middle of a test: as it is given, for the amplitude about it leaves nothing of the recorded stroke."""
@@ -41,18 +41,19 @@ def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
         if context.damper.fitted_law
         else "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C"
     )
-    text = f"{element} in series with the oil spring k. {_gap(context.diagnosed.diagnosis.gap)}"
+    text = f"{element} in series with the oil spring k. {_gap(context.diagnosed.diagnosis)}"
     blocks: list[Block] = [Paragraph(text), *galleries(pictures["model"])]
     where = context.diagnosed.diagnosis.where
     if where:
         columns = (Column("region", "region"), tables.share("share_of_gap", "share of the gap"))
-        blocks.append(Table("Where the gap lies", columns, where).block())
+        blocks.append(Table("Where the gap lies; regions overlap, and so do their shares", columns, where).block())
     return Section("model", f"Where the {context.damper.baseline_name} fails", tuple(blocks))
 
 
-def _gap(gap: Gap | None) -> str:
+def _gap(diagnosis: Diagnosis) -> str:
+    gap = diagnosis.gap
     if gap is None:
-        return "Its error on data that no fit has seen could not be measured."
+        return f"Its error on data that no fit has seen {'was ' * diagnosis.by_knee_law}{no_gap(diagnosis)}."
     return (
         f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where {noise_named(gap)} would "
         f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the residual is "
@@ -70,7 +71,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
         "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
     )
     blocks: list[Block] = [Paragraph(f"{verdict(context)}{sure}")]
-    blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap_closed(diagnosis)) if text]
+    told = (sentence(diagnosis.reason), _of_peak(diagnosis), _gap_closed(diagnosis))
+    blocks += [Paragraph(text) for text in told if text]
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
         blocks.append(tables.effect_parameters(diagnosis, context.control).block())
@@ -112,6 +114,16 @@ def verdict(context: ReportContext) -> str:
         found += f"; {listed(effects_in_words(added))} predicts, whatever {stands} for" if added else ""
         text = f"Something is missing that the library of effects does not explain{found}"
     return f"{text}."
+
+
+def _of_peak(diagnosis: Diagnosis) -> str:
+    """Return what the reason counts in % of peak, beside the errors in % of the force elsewhere."""
+    if diagnosis.gap is None or "of peak" not in diagnosis.reason:
+        return ""
+    return (
+        "A gap in % of peak is its r.m.s. above the noise, beside the peak force: 0 % where nothing stands out of the "
+        "noise. An error in % of the force is an r.m.s. with the noise in it, beside the r.m.s. force."
+    )
 
 
 def _gap_closed(diagnosis: Diagnosis) -> str:
