@@ -258,7 +258,7 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
     if chance < config.significance and size >= config.visible:
         alone = f"probability by noise alone {max(chance, 1e-300):.1g}"
         return Decision(
-            "unexplained", f"{gap} that repeats ({alone}); no effect of the library is supported by itself", None
+            "unexplained", f"{gap} that repeats ({alone}); no effect that a verdict names is supported by itself", None
         )
     possible = tuple(
         dict.fromkeys((*selection.undecided, *_likelier_alternatives(selection, config, thresholds.NUISANCE_EFFECTS)))
