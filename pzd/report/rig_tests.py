@@ -99,9 +99,10 @@ class RigTests:
     def by_motion(self, records: Sequence[Record]) -> list[Record]:
         """Return records by frequency, amplitude and control signal, those that do not repeat last, as they came."""
 
-        def key(one: Record) -> tuple[float, float, float]:
-            swing = self._swing(one)
-            return (*swing, self.level(one) or 0.0) if swing else (math.inf, math.inf, 0.0)
+        def key(one: Record) -> tuple[float, ...]:
+            # To the digits that `motion` shows: as measured no two tests have the same amplitude.
+            swing = [float(f"{value:.3g}") for value in self._swing(one) or (math.inf, math.inf)]
+            return (*swing, (self.level(one) or 0.0) if np.isfinite(swing[0]) else 0.0)
 
         return sorted(records, key=key)
 

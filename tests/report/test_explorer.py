@@ -79,7 +79,7 @@ def test_tests_stand_by_frequency_then_amplitude_then_control_and_those_that_do_
 ) -> None:
     monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: defaultdict(tuple))
     of = run.identified.measures[0]
-    swings = {"r01": (2.0, 0.01), "r02": (1.5, 0.02), "r03": (1.5, 0.01)}
+    swings = {"r01": (1.9999, 0.01), "r02": (1.50001, 0.01999), "r03": (1.50002, 0.01)}
     measured = tuple(
         of.model_copy(update={"record": name, "frequency_Hz": f, "amplitude_m": a}) for name, (f, a) in swings.items()
     )
