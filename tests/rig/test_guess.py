@@ -130,6 +130,29 @@ def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_pa
     assert (entry.temperature_degC, entry.voltage_V) == (22.5, 0.5)
 
 
+def test_a_column_in_degrees_is_the_temperature_by_its_unit_alone(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 31.5)]
+    path = stored(tmp_path / "a.csv", ["time [s],stroke [mm],force [N],oil [degC]"], columns, ",")
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert entry.temperature_degC == 31.5
+
+
+UNREAD = {
+    "oil [degC],housing [degC]": "oil [degC] (may be the temperature), housing [degC] (may be the temperature)",
+    "Supply [V],Counter": "Supply [V] (may be a control signal), Counter",
+    "Encoder [mm],Temp [degC]": "Encoder [mm] (another displacement)",
+    "Channel A,Channel C": "Channel A, Channel C",
+}
+
+
+@pytest.mark.parametrize("heads", UNREAD)
+def test_every_column_that_is_not_read_is_told_with_what_it_may_be(tmp_path: Path, heads: str) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 5.0, 0 * X + 31.5)]
+    path = stored(tmp_path / "a.csv", [f"time [s],LVDT [mm],force [N],{heads}"], columns, ",")
+    assert f"      # not read: {UNREAD[heads]}" in guessed([path])
+    assert read_back(tmp_path, [path]).records
+
+
 @pytest.mark.parametrize(
     "control", [("U_V", "voltage"), ("ctrl (V)", "voltage"), ("I_A", "current"), ("Coil/A", "current")]
 )
@@ -187,7 +210,7 @@ def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str]
     text = "\n".join(guessed([stored(tmp_path / "a.csv", [*above, head], columns, ";")]))
     asked = "rate_Hz:   # fill in: samples a second"
     assert asked in text
-    assert "Sample" not in text
+    assert "Sample" not in text.partition("# not read: ")[0]
     (tmp_path / "guess.yaml").write_text(text.replace(asked, "rate_Hz: 500  #"), encoding="utf-8")
     config = load(tmp_path / "guess.yaml")
     (record,) = ingest(config.rig, config.control.signal(), tmp_path).records

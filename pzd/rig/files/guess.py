@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 
 from pzd.quantities import (
     ACCELERATION,
+    CHANNELS,
     DISPLACEMENT,
     FORCE,
     TEMPERATURE,
@@ -24,7 +25,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
-from pzd.rig.files.dialect import BLANKS
+from pzd.rig.files.dialect import BLANKS, ROW_NAMES
 from pzd.rig.files.formats import TEXT, lines_above, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
 from pzd.rig.files.reading import read
@@ -39,6 +40,7 @@ from pzd.rig.files.sniffing import (
     described,
     doubt_in_names,
     is_canonical,
+    is_in_unit,
     one_pattern,
     quantity_of,
     said_above,
@@ -263,10 +265,11 @@ def _keys(
     if TIME in missing and (rate := _sampling_rate(files[0], columns)):
         missing.remove(TIME)
         yield rate
+    offered = _offered(files[0], columns, missing, several)
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        yield from _asked_columns(files[0], columns, missing, several)
+        yield from _asked_columns(offered)
     units = [*_units(named, dialect), *(f"  {name}: {written(unit)}" for name, unit in in_names.items() if unit)]
     units += [
         f"  {name}:   # fill in: the unit of {name} in the files' names"
@@ -284,7 +287,11 @@ def _keys(
         yield _asked_pattern(*doubt, pattern, stems)
     elif pattern:
         yield _pattern_key(pattern)
-    yield from _events(files[0])
+    events = [*_events(files[0])]
+    yield from events
+    taken = {*chain(*offered.values()), *(files[0].dialect.header[-1:] if events else ())}
+    if not dialect.headless and (unread := _not_read(files[0], columns, taken, control)):
+        yield unread
     if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
@@ -308,22 +315,47 @@ def _counts_rows(file: SniffedFile, head: str) -> bool:
     return numbers.size > 1 and bool(np.all(np.diff(numbers) == 1.0))
 
 
-def _asked_columns(
+def _offered(
     file: SniffedFile,
     columns: dict[Quantity, str],
     missing: Sequence[Quantity],
     several: Mapping[Quantity, Sequence[str]],
-) -> Iterator[str]:
+) -> dict[Quantity, list[str]]:
+    """Return by quantity that only a person can find the headers that may be it."""
+    return {quantity: [*several.get(quantity, _candidates(file, columns, quantity))] for quantity in missing}
+
+
+def _asked_columns(offered: Mapping[Quantity, list[str]]) -> Iterator[str]:
     """Write the empty places of columns that only a person knows, each with those that may stand there."""
-    offered: list[list[str]] = []
-    for quantity in missing:
-        free = [*several.get(quantity, _candidates(file, columns, quantity))]
+    shown: list[list[str]] = []
+    for quantity, free in offered.items():
         counted = "; or say rate_Hz: N instead, where no column holds it" if quantity is TIME else ""
-        if free in offered:
+        if free in shown:
             yield f"  {quantity.name}:   # fill in: one of the others of these{counted}"
         else:
             yield f"  {quantity.name}:   # fill in: one of {', '.join(free) or 'none that is seen'}{counted}"
-        offered.append(free)
+        shown.append(free)
+
+
+def _not_read(file: SniffedFile, columns: Mapping[Quantity, str], asked: Collection[str], control: Control) -> str:
+    """Write which columns stay unread, and what each may be; empty where all of them are read or asked for."""
+    named = [head for head in file.dialect.header if head.strip() and head != ROW_NAMES]
+    left = dict.fromkeys(head for head in named if head not in columns.values() and head not in asked)
+    told = [" ".join(head.split()) + _what_it_may_be(file, head, columns, control) for head in left]
+    return f"# not read: {', '.join(told)}" if told else ""
+
+
+def _what_it_may_be(file: SniffedFile, head: str, columns: Mapping[Quantity, str], control: Control) -> str:
+    """Say in brackets which quantity a column that is not read may be; empty where nothing tells."""
+    named = quantity_of(head, file.unit_below(head, own_quantity(VOLTAGE, control)), control)
+    by_unit = (each for each in CHANNELS if each is not VOLTAGE and is_in_unit(head, file.unit_below(head, each), each))
+    quantity = named or next(by_unit, None)
+    if quantity is not None:
+        name = own_quantity(quantity, control).name
+        return f" (another {name})" if quantity in columns else f" (may be the {name})"
+    signals = (own_quantity(VOLTAGE, each) for each in CONTROLS)
+    signal = any(is_in_unit(head, file.unit_below(head, each), each) for each in signals)
+    return " (may be a control signal)" if signal else ""
 
 
 def _asked_units(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:

@@ -156,7 +156,28 @@ def claims(headers: Sequence[str], units: Sequence[str] | None, control: Control
             found[quantity] = (best, [header])
         elif best == found[quantity][0] and _bare(header) not in map(_bare, found[quantity][1]):
             found[quantity][1].append(header)
-    return {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
+    named = {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
+    warm = [] if TEMPERATURE in named else _warm_without_a_name(headers, units, control)
+    return {**named, TEMPERATURE: warm} if len(warm) == 1 else named
+
+
+def _warm_without_a_name(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> list[str]:
+    """Return the headers of no quantity that a unit of temperature follows: `oil [degC]`."""
+    below: Sequence[str | None] = units or [None] * len(headers)
+    return [
+        header
+        for header, unit in zip(headers, below, strict=True)
+        if quantity_of(header, unit, control) is None
+        and is_in_unit(header, unit, TEMPERATURE)
+        and not _NOT_THE_ONE.search(_bare(header))
+    ]
+
+
+def is_in_unit(header: str, below: str | None, quantity: Quantity) -> bool:
+    """Whether a unit of a quantity stands in a header or below it; a last letter may be the name of a channel."""
+    last = _LAST_WORD.search(header)
+    named = bool(below and below.strip("[]() ")) or in_header(header, quantity) or (last and len(last[1]) > 1)
+    return bool(named) and unit_of(header, below, quantity) is not None
 
 
 def is_canonical(header: str, quantity: Quantity, control: Control) -> bool:
