@@ -388,9 +388,36 @@ def test_clickers_are_read_by_a_layout_that_does_not_tell_where_they_stand(tmp_p
     assert [entry.setting for entry in read_back(tmp_path, files).entries] == ["click1", "click5"]
 
 
+DAMPERS = {
+    "LF_0.5Hz RF_1.0Hz": "LF RF",
+    "sine_2Hz_front_left sine_2Hz_rear_left": "front_left rear_left",
+    "SN1041_sine SN1042_sine": "SN1041 SN1042",
+    "run_damper-1_a run_damper-2_a": "damper-1 damper-2",
+    "LF_C12_R8_15in_s RF_C12_R8_15in_s": "LF_C12_R8 RF_C12_R8",
+    "C4_R8_LF_15in_s C12_R8_LR_15in_s": "C12_R8_LR C4_R8_LF",
+    "LF_15in_s_click5 RF_15in_s_click1": "LF_click5 RF_click1",
+    "FR_3Hz_150V FL_3Hz_150V": "FL FR",
+}
+
+
+@pytest.mark.parametrize("among_others", [False, True])
+@pytest.mark.parametrize("names", DAMPERS)
+def test_dampers_of_several_corners_or_numbers_are_settings(tmp_path: Path, names: str, among_others: bool) -> None:
+    """One fit to two dampers is neither."""
+    columns = [numbers(values) for values in (TIME, X, FORCE)]
+    head = ["time_s,displacement_m,force_N"]
+    files = [stored(tmp_path / "data" / f"{stem}.csv", head, columns, ",") for stem in names.split()]
+    if among_others:
+        stored(tmp_path / "data" / "of_another_day.csv", head, columns, ",")
+    entries = read_back(tmp_path, files).entries
+    assert sorted(entry.setting or "" for entry in entries) == DAMPERS[names].split()
+    assert load(tmp_path / "guess.yaml").setting == DAMPERS[names].split()[0]
+    assert {entry.voltage_V for entry in entries} == ({150.0} if "V" in names else {None})
+
+
 def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, X, FORCE)]
-    for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a")):
+    for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a"), ("LF-a", "LF-b")):
         files = [
             stored(tmp_path / names[1] / f"{name}.csv", ["time_s,displacement_m,force_N"], columns, ",")
             for name in names

@@ -46,6 +46,7 @@ from pzd.rig.files.sniffing import (
     said_above,
     setting_in_names,
     setting_of,
+    settings_apart,
     unit_of,
     value_in_names,
 )
@@ -179,37 +180,40 @@ class SniffedFile:
         )
 
 
-def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
-    """Make the entries of files that a layout fits."""
+def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path], among: Sequence[str]) -> Iterator[GuessedEntry]:
+    """Make the entries of files that a layout fits; `among` are the names of all files."""
     quantities = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
     quantities |= set(layout.split.constants) if layout.split else set()
     controlled = not quantities.isdisjoint((VOLTAGE.name, layout.control.signal().name))
-    for path, members in _patterns(paths):
+    for path, members, setting, in_names in _by_setting(paths, among):
         lines = [f"    - path: {written(path)}", f"      layout: {name}    # {layout.about}"]
-        pattern = layout.pattern or setting_in_names([file.stem for file in members])
+        pattern = layout.pattern or in_names
+        lines += [f"      {_setting_key(setting)}"] if setting and pattern is None else []
         if pattern != layout.pattern:
             lines.append(f"      {_pattern_key(pattern)}")
-        yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file) for file in members))
+        settings = tuple(setting or setting_of(pattern, file) for file in members)
+        yield GuessedEntry(tuple(lines), controlled, settings)
 
 
-def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[GuessedEntry]:
-    """Make the entries of files from their headers."""
+def by_headers(found: Sequence[SniffedFile], control: Control, among: Sequence[str]) -> Iterator[GuessedEntry]:
+    """Make the entries of files from their headers; `among` are the names of all files."""
     groups: dict[tuple[object, ...], list[SniffedFile]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
         levels = _levels_of_folders([file.path for file in group], control)
         above = [text for file in group for text in file.above]
-        for path, members in _patterns([file.path for file in group]):
+        for path, members, setting, in_names in _by_setting([file.path for file in group], among):
             mine = [file for file in group if file.path in members]
             d = mine[0].dialect
             columns = dict(mine[0].columns) if d.headless else _told(d, control)
-            pattern, units = _from_names(mine, columns, control)
+            pattern, units = _from_names(mine, columns, control, in_names)
             unknown = [q for q in (VOLTAGE, TEMPERATURE) if not {q, own_quantity(q, control).name} & {*columns, *units}]
             preamble, said = said_above(above, unknown, control)
             lines = [f"    - path: {written(path)}"]
             lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units | said)]
+            lines += [f"      {_setting_key(setting)}"] if setting else []
             if preamble:
                 lines.append(f"      preamble: {written(preamble)}    # in the lines above the header")
             asked = doubt_in_names([file.path.stem for file in mine]) is not None
@@ -217,7 +221,8 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
             if not controlled and (level := levels.get(mine[0].path.parent)):
                 lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
                 controlled = True
-            yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file.path) for file in mine))
+            settings = tuple(setting or setting_of(pattern, file.path) for file in mine)
+            yield GuessedEntry(tuple(lines), controlled, settings)
 
 
 def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, str]:
@@ -237,14 +242,16 @@ def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:
 
 
 def _from_names(
-    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
+    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control, setting: str | None
 ) -> tuple[str | None, dict[str, str | None]]:
-    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
+    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it.
+
+    `setting` is the part of it that finds the setting.
+    """
     names = [file.path.stem for file in files]
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
     wanted = [name for quantity, name in labels.items() if quantity not in columns]
     values = {name: value for name in wanted if (value := value_in_names(names, name))}
-    setting = setting_in_names(names)
     pattern = one_pattern([pattern for pattern, _ in values.values()] + ([setting] if setting else []), names)
     return pattern, {name: unit for name, (_, unit) in values.items()} if pattern else {}
 
@@ -406,6 +413,21 @@ def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
         else:
             found += [(path.as_posix(), [path]) for path in mine]
     return found
+
+
+def _by_setting(
+    paths: Sequence[Path], among: Sequence[str]
+) -> Iterator[tuple[str, Sequence[Path], str | None, str | None]]:
+    """Yield a path pattern, its files, and their setting or else the pattern that finds it in their names."""
+    apart: Sequence[str | None] = settings_apart([path.stem for path in paths], among) or [None] * len(paths)
+    for setting in dict.fromkeys(apart):
+        mine = [path for path, its in zip(paths, apart, strict=True) if its == setting]
+        for path, members in _patterns(mine):
+            yield path, members, setting, None if setting else setting_in_names([m.stem for m in members], among)
+
+
+def _setting_key(setting: str) -> str:
+    return f"setting: {written(setting)}    # from the files' names"
 
 
 def _pattern_key(pattern: str | None) -> str:
@@ -573,9 +595,10 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
     fitting, found = _by_fit(files, layout)
+    among = [path.stem for path in files]
     control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
-    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths)]
-    entries += by_headers(found, control)
+    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths, among)]
+    entries += by_headers(found, control, among)
     lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if fitting:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
