@@ -30,6 +30,8 @@ CREEPING = 5e-3
 """where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
 OFTEN = 0.01
 """Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
+FEWEST_TICKS = 3
+"""Times that a clock with too few digits must go on to tell a rate: two whole ticks lie between them."""
 LONGEST_PAUSE = 600.0
 """Pause [s] that no test has, where it is longer than all the rest of the record as well."""
 MOST_LOST = 1_000_000
@@ -65,11 +67,19 @@ def standstills(test: RawRecord) -> list[str]:
         return [_goes_back(test, told, steps)]
     if np.mean(steps == 0.0) < OFTEN:
         return [f"{told}; take the rows that repeat a time out"]
-    goes_on = np.flatnonzero(steps > 0.0) + 1  # the first stamp and the last may not be whole ones
-    first, last = (goes_on[0], goes_on[-1]) if goes_on.size > 1 else (0, time.size - 1)
+    return [_too_few_digits(told, time)]
+
+
+def _too_few_digits(told: str, time: Array) -> str:
+    """Say that a clock stands still between its ticks, and the rate that whole ticks tell."""
+    goes_on = np.flatnonzero(np.diff(time) > 0.0) + 1  # the first stamp and the last may not be whole ones
+    if goes_on.size < FEWEST_TICKS:
+        when = "for N samples a second, which this clock does not tell, and leave out the column of the time"
+        return Advised(f"{told}; it has too few digits;", Advice("rate_Hz", "N", when=when))
+    first, last = goes_on[0], goes_on[-1]
     rate = (last - first) / (time[last] - time[first])
     when = "or what is known of it, and leave out the column of the time"
-    return [Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))]
+    return Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))
 
 
 def _goes_back(test: RawRecord, told: str, steps: Array) -> str:
