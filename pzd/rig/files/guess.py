@@ -50,7 +50,7 @@ from pzd.rig.files.sniffing import (
     unit_of,
     value_in_names,
 )
-from pzd.rig.files.units import RECORDED, columns_under, factor_in, in_header
+from pzd.rig.files.units import RECORDED, columns_under, factor_in, in_header, meant_by
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.measures import work
@@ -498,6 +498,8 @@ def _lacking(column: str, below: str | None, quantity: Quantity) -> str:
             f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}; with its zero "
             f"-200 {quantity.unit}/{recorded} about 2.5 {recorded}, or about the mean of the first 10"
         )
+    if recorded and (advice := meant_by(recorded, quantity)):
+        return f"is in {recorded}: {advice}"
     if factor_in(column):
         return f"names a factor: what one recorded unit stands for, e.g. {quantity.unit}"
     return f"names no unit, e.g. {quantity.unit}"
