@@ -25,6 +25,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
+from pzd.rig.files.clock import numbering_column
 from pzd.rig.files.dialect import BLANKS, ROW_NAMES
 from pzd.rig.files.formats import TEXT, lines_above, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
@@ -294,9 +295,13 @@ def _keys(
         yield _asked_pattern(*doubt, pattern, stems)
     elif pattern:
         yield _pattern_key(pattern)
-    events = [*_events(files[0])]
-    yield from events
-    taken = {*chain(*offered.values()), *(files[0].dialect.header[-1:] if events else ())}
+    taken = {*chain(*offered.values())}
+    if (event := _event(files[0])) is not None:
+        yield event
+        taken.add(dialect.header[-1])
+    elif (column := _numbering(files[0], columns, taken)) is not None:
+        yield f"split: {{column: {written(column)}}}    # the clock begins again where its label changes"
+        taken.add(column)
     if not dialect.headless and (unread := _not_read(files[0], columns, taken, control)):
         yield unread
     if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
@@ -522,19 +527,32 @@ def _date_format(cell: str) -> str | None:
     return None
 
 
-def _events(file: SniffedFile) -> Iterator[str]:
+def _numbering(file: SniffedFile, columns: Mapping[Quantity, str], taken: Collection[str]) -> str | None:
+    """Return the header of the column that numbers the tests of a file, whose clock begins again with each."""
+    head = columns.get(TIME, "")
+    free = [each for each in file.dialect.header if each.strip() and each not in {*columns.values(), *taken}]
+    entry = _as_sniffed(file)
+    try:
+        sheet = read_sheet(file.path, entry, Wanted(numbers=frozenset((head,))), "rig.files")
+    except DataError:
+        return None
+    time = sheet.numbers.get(sheet.header.index(head), np.empty(0)) if head in sheet.header else np.empty(0)
+    falls = np.flatnonzero(np.diff(time) < 0.0) + 1
+    return numbering_column(file.path, entry, free, falls.tolist(), range(1, time.size))[0] if falls.size else None
+
+
+def _event(file: SniffedFile) -> str | None:
     """Write how to cut a file of a logger that was paused, by the event in its last column with which it went on."""
     head = file.dialect.header[-1]
     if file.form != TEXT or not _EVENTS.search(head):
-        return
+        return None
     wanted = Wanted(texts=frozenset((head,)))
     try:
         sheet = read_sheet(file.path, _as_sniffed(file, FileSplit(event=head, begins=" ")), wanted, "rig.files")
     except DataError:
-        return
+        return None
     later = [text for text in sheet.texts[sheet.header.index(head)][1:] if _GOES_ON.search(text)]
-    if later:
-        yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
+    return f"split: {{event: {written(head)}, begins: {written(later[0])}}}" if later else None
 
 
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
