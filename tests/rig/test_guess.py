@@ -112,6 +112,28 @@ def test_which_way_is_rebound_is_always_asked_and_the_answer_turns_both_channels
     assert turned.force == pytest.approx(-record.force)
 
 
+def test_headers_that_name_compression_are_told_with_the_signs_that_turn_them(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE)]
+    path = stored(tmp_path / "a.csv", ["Time [s],Comp Travel [mm],Comp Force [N]"], columns, ",")
+    (told,) = [line for line in guessed([path]) if "compression, by" in line]
+    assert told.startswith("      # compression, by Comp Travel [mm] and Comp Force [N]: where it is positive, say ")
+    entry = read_back(tmp_path, [path]).entries[0]
+    assert [finding.check for finding in entry.findings if "whose header is" in finding.where] == ["sign", "sign"]
+    (answer,) = re.findall(r"say (sign: \{.*\})$", told)
+    (tmp_path / "turned.yaml").write_text("\n".join([*guessed([path]), f"      {answer}"]), encoding="utf-8")
+    (turned,) = ingest(load(tmp_path / "turned.yaml").rig, Control(), tmp_path).records
+    assert np.abs(turned.force + FORCE).max() < 1e-5
+    compensated = stored(tmp_path / "b.csv", ["Time [s],Travel [mm],Temp comp Force [N]"], columns, ",")
+    assert not any("compression, by" in line for line in guessed([compensated]))
+
+
+def test_a_curve_with_a_column_for_each_direction_is_no_test_and_taken_by_damper(tmp_path: Path) -> None:
+    path = tmp_path / "pvp.csv"
+    path.write_text("Velocity (in/s),Compression (lbf),Rebound (lbf)\n1,-35,60\n2,-50,90\n3,-62,118\n", "utf-8")
+    with pytest.raises(DataError, match=r"in place of a rig take it by damper: \{curve: \S*pvp.csv\} \("):
+        guessed([path])
+
+
 def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_path: Path) -> None:
     heads = "Time (s),Load (V),Stroke (V),Load (N),Stroke (mm),Temp (C),Coil current (A)"
     volts = [numbers(values) for values in (TIME, FORCE / 500.0, X * 100.0, FORCE, MM, 0 * X + 22.5, 0 * X + 0.5)]

@@ -25,6 +25,7 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
+from pzd.rig.files.channels import COMPRESSION
 from pzd.rig.files.clock import numbering_column
 from pzd.rig.files.dialect import BLANKS, ROW_NAMES
 from pzd.rig.files.formats import TEXT, lines_above, read_sheet
@@ -304,8 +305,19 @@ def _keys(
         taken.add(column)
     if not dialect.headless and (unread := _not_read(files[0], columns, taken, control)):
         yield unread
-    if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
+    if not missing:
+        yield from _signs(files, columns)
+
+
+def _signs(files: Sequence[SniffedFile], columns: dict[Quantity, str]) -> Iterator[str]:
+    """Write the sign where the work tells that it is wrong, or else that headers name compression."""
+    compressed = {q: columns[q] for q in (DISPLACEMENT, FORCE) if COMPRESSION.search(columns[q])}
+    if any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
+    elif compressed:
+        by = " and ".join(" ".join(head.split()) for head in compressed.values())
+        turned = ", ".join(f"{quantity.name}: -1" for quantity in compressed)
+        yield f"# compression, by {by}: where it is positive, say sign: {{{turned}}}"
 
 
 def _sampling_rate(file: SniffedFile, columns: dict[Quantity, str]) -> str | None:
@@ -743,10 +755,13 @@ def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str
     heads = [head for head in file.dialect.header if head.strip()]
     if TIME not in columns and _FREQUENCY.search(heads[0]) and columns.get(FORCE, heads[0]) == heads[0]:
         return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
-    if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
+    both_ways = all(any(pattern.search(head) for head in heads) for pattern in DIRECTIONS.values())
+    forces = 2 if both_ways and FORCE not in columns else int(FORCE in columns)
+    timeless = VELOCITY in columns and not {TIME, DISPLACEMENT} & set(columns)
+    if timeless and forces and len(heads) <= len({*columns} - {FORCE}) + forces + 1:
         curve = "a curve of force over velocity, and no recording over time: in place of a rig take it by damper: "
         path = file.path.as_posix()
-        if all(any(pattern.search(head) for head in heads) for pattern in DIRECTIONS.values()):
+        if both_ways:
             return f"{curve}{{curve: {path}}}"
         return f"{curve}{{curve: {path}, sign: 1}}, or sign: -1 where positive velocities compress"
     accelerations = [
