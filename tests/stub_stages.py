@@ -53,6 +53,8 @@ UNDETERMINED = 99
 """A seed with which C is undetermined."""
 LOUD = Finding(check="range", where="all of it", size=901.0, unit="N", follows="look at the load cell")
 """Found in a test with more than 900 N."""
+TWO_LEVELS = Finding(check="level", where="force", size=1.6, unit="-", follows="one fit to both is neither")
+"""Found in a test with more than 1000 N as well."""
 NEXT_TEST = NextTest(
     waveform="sine",
     frequency_Hz=4.0,
@@ -80,7 +82,7 @@ def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:
             temperature_degC=22.0,
             rate_Hz=1.0,
             cycles=0.0,
-            findings=(LOUD,) if r.force[0] > 900.0 else (),
+            findings=((LOUD, TWO_LEVELS) if r.force[0] > 1000.0 else (LOUD,)) if r.force[0] > 900.0 else (),
         )
         for r in records
     ]

@@ -141,6 +141,12 @@ def test_what_the_preflight_finds_is_said_with_where_it_is_told_whole(bench: Ben
     assert f"ingest     1 finding, b: range: all of it; pzd check {bench.config} prints what follows" in bench.lines
 
 
+def test_of_several_findings_the_one_that_makes_another_damper_is_said(bench: Bench) -> None:
+    (bench.config.parent / "data" / "b.csv").write_text("1001")
+    bench()
+    assert any(line.startswith("ingest     2 findings, b: level: force;") for line in bench.lines)
+
+
 def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:
     bench()
     for name in ("a", "b"):

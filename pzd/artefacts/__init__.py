@@ -49,7 +49,7 @@ from pzd.artefacts.rides import (
     WeightedRow,
     WheelRow,
 )
-from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, worst
 from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | MountedDampers | Rides | Report

@@ -38,6 +38,25 @@ class Finding(Frozen):
     """What follows for the results."""
 
 
+ANOTHER_DAMPER = ("scale", "units", "sign", "clock", "level")
+"""Checks whose findings make another damper of the fit, the gravest first; the others cost accuracy, or are marks."""
+
+
+def worst(findings: Sequence[tuple[str, Finding]]) -> tuple[str, Finding]:
+    """Return the name of a record and the gravest of the findings; of those as grave the first.
+
+    Parameters
+    ----------
+    findings : each with the name of its record, at least one
+    """
+
+    def rank(found: tuple[str, Finding]) -> int:
+        check = found[1].check
+        return ANOTHER_DAMPER.index(check) if check in ANOTHER_DAMPER else len(ANOTHER_DAMPER)
+
+    return min(findings, key=rank)
+
+
 class RecordEntry(Frozen):
     """One record as records.json lists it."""
 

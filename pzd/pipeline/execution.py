@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from pzd.artefacts import Artefact, Diagnosed, Identified, MountedDampers, Rides, Rig, Table
+from pzd.artefacts import Artefact, Diagnosed, Identified, MountedDampers, Rides, Rig, Table, worst
 from pzd.config import RunConfig, setting_in_use
 from pzd.parallel.processes import Listener, no_listener
 from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
@@ -183,11 +183,11 @@ class Pipeline:
         return tuple(dict.fromkeys([mark for marks in before for mark in marks] + list(own)))
 
     def _say_findings(self, stage: Stage, rig: Rig) -> None:
-        """Say how much the preflight finds, and what first: all later numbers are of these records."""
+        """Say how much the preflight finds, and the gravest: all later numbers are of these records."""
         found = [(entry.name, finding) for entry in rig.entries for finding in entry.findings]
         if found:
-            name, first = found[0]
-            such = f"{name}: {first.check}: {first.where}"
+            name, gravest = worst(found)
+            such = f"{name}: {gravest.check}: {gravest.where}"
             self._say(
                 stage, f"{counted(len(found), 'finding')}, {such}; pzd check {self.run.config} prints what follows"
             )

@@ -14,6 +14,7 @@ from written_files import CANONICAL, FORCE, TIME, X, lines, refused, run, write,
 
 from pzd.damper.element import element_force
 from pzd.record import Array
+from pzd.rig.files.guess import guessed
 
 AMPLITUDE, FREQUENCY = 0.02, 1.0
 
@@ -184,8 +185,27 @@ def test_a_clock_that_begins_again_is_another_test_and_the_column_that_numbers_t
     columns = {"Test No": numbers} | {name: np.tile(values, 2) for name, values in CANONICAL.items()}
     write(tmp_path / "a.csv", lines(columns))
     (said,) = refused(tmp_path)
-    assert "another test begins there; say split: {column: HEADER} with the column that numbers the tests" in said
+    assert "another test begins there; say split: {column: Test No} or write each into a file of its own" in said
     assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "Test No"}}).records) == 2
+    assert any(line.startswith("      split: {column: Test No}") for line in guessed([tmp_path / "a.csv"]))
+
+
+def test_without_a_column_that_numbers_the_tests_a_clock_that_goes_back_cuts_the_file(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines({name: np.tile(values, 3) for name, values in CANONICAL.items()}))
+    (said,) = refused(tmp_path)
+    (gap,) = re.findall(r"say split: \{gap_s: ([0-9.]+)\} which cuts where the clock goes back as well, or", said)
+    assert len(run(tmp_path, {"path": "*.csv", "split": {"gap_s": float(gap)}}).records) == 3
+
+
+def test_a_column_that_tells_some_of_the_tests_apart_cuts_no_file(tmp_path: Path) -> None:
+    """Cut at its labels the clock begins again in each part, and cut at the clock two dampers would be one."""
+    corner = [label for label in ("LF", "LR") for _ in range(2 * TIME.size)]
+    write(tmp_path / "a.csv", lines({"Corner": corner, **{k: np.tile(v, 4) for k, v in CANONICAL.items()}}))
+    (said,) = refused(tmp_path)
+    assert "column 'Corner' tells only some of them apart: write each into a file of its own" in said
+    for split in ({"column": "Corner"}, {"event": "Corner", "begins": "LR"}):
+        said = refused(tmp_path, {"path": "a.csv", "split": split})[0]
+        assert said.endswith("another test begins there: write each into a file of its own")
 
 
 def test_tests_of_other_lengths_in_one_file_are_told_as_such(tmp_path: Path) -> None:
@@ -195,7 +215,7 @@ def test_tests_of_other_lengths_in_one_file_are_told_as_such(tmp_path: Path) -> 
     columns = {"test": numbers} | {name: np.asarray(values)[rows] for name, values in CANONICAL.items()}
     write(tmp_path / "a.csv", lines(columns))
     (said,) = refused(tmp_path)
-    assert "another test begins there; say split: {column: HEADER}" in said
+    assert "another test begins there; say split: {column: test}" in said
     assert len(run(tmp_path, {"path": "*.csv", "split": {"column": "test"}}).records) == 3
 
 

@@ -112,6 +112,28 @@ def test_which_way_is_rebound_is_always_asked_and_the_answer_turns_both_channels
     assert turned.force == pytest.approx(-record.force)
 
 
+def test_headers_that_name_compression_are_told_with_the_signs_that_turn_them(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE)]
+    path = stored(tmp_path / "a.csv", ["Time [s],Comp Travel [mm],Comp Force [N]"], columns, ",")
+    (told,) = [line for line in guessed([path]) if "compression, by" in line]
+    assert told.startswith("      # compression, by Comp Travel [mm] and Comp Force [N]: where it is positive, say ")
+    entry = read_back(tmp_path, [path]).entries[0]
+    assert [finding.check for finding in entry.findings if "whose header is" in finding.where] == ["sign", "sign"]
+    (answer,) = re.findall(r"say (sign: \{.*\})$", told)
+    (tmp_path / "turned.yaml").write_text("\n".join([*guessed([path]), f"      {answer}"]), encoding="utf-8")
+    (turned,) = ingest(load(tmp_path / "turned.yaml").rig, Control(), tmp_path).records
+    assert np.abs(turned.force + FORCE).max() < 1e-5
+    compensated = stored(tmp_path / "b.csv", ["Time [s],Travel [mm],Temp comp Force [N]"], columns, ",")
+    assert not any("compression, by" in line for line in guessed([compensated]))
+
+
+def test_a_curve_with_a_column_for_each_direction_is_no_test_and_taken_by_damper(tmp_path: Path) -> None:
+    path = tmp_path / "pvp.csv"
+    path.write_text("Velocity (in/s),Compression (lbf),Rebound (lbf)\n1,-35,60\n2,-50,90\n3,-62,118\n", "utf-8")
+    with pytest.raises(DataError, match=r"in place of a rig take it by damper: \{curve: \S*pvp.csv\} \("):
+        guessed([path])
+
+
 def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_path: Path) -> None:
     heads = "Time (s),Load (V),Stroke (V),Load (N),Stroke (mm),Temp (C),Coil current (A)"
     volts = [numbers(values) for values in (TIME, FORCE / 500.0, X * 100.0, FORCE, MM, 0 * X + 22.5, 0 * X + 0.5)]
@@ -128,6 +150,29 @@ def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_pa
     assert "temperature: degC" in text
     (entry,) = read_back(tmp_path, [path]).entries
     assert (entry.temperature_degC, entry.voltage_V) == (22.5, 0.5)
+
+
+def test_a_column_in_degrees_is_the_temperature_by_its_unit_alone(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 31.5)]
+    path = stored(tmp_path / "a.csv", ["time [s],stroke [mm],force [N],oil [degC]"], columns, ",")
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert entry.temperature_degC == 31.5
+
+
+UNREAD = {
+    "oil [degC],housing [degC]": "oil [degC] (may be the temperature), housing [degC] (may be the temperature)",
+    "Supply [V],Counter": "Supply [V] (may be a control signal), Counter",
+    "Encoder [mm],Temp [degC]": "Encoder [mm] (another displacement)",
+    "Channel A,Channel C": "Channel A, Channel C",
+}
+
+
+@pytest.mark.parametrize("heads", UNREAD)
+def test_every_column_that_is_not_read_is_told_with_what_it_may_be(tmp_path: Path, heads: str) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 5.0, 0 * X + 31.5)]
+    path = stored(tmp_path / "a.csv", [f"time [s],LVDT [mm],force [N],{heads}"], columns, ",")
+    assert f"      # not read: {UNREAD[heads]}" in guessed([path])
+    assert read_back(tmp_path, [path]).records
 
 
 @pytest.mark.parametrize(
@@ -187,7 +232,7 @@ def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str]
     text = "\n".join(guessed([stored(tmp_path / "a.csv", [*above, head], columns, ";")]))
     asked = "rate_Hz:   # fill in: samples a second"
     assert asked in text
-    assert "Sample" not in text
+    assert "Sample" not in text.partition("# not read: ")[0]
     (tmp_path / "guess.yaml").write_text(text.replace(asked, "rate_Hz: 500  #"), encoding="utf-8")
     config = load(tmp_path / "guess.yaml")
     (record,) = ingest(config.rig, config.control.signal(), tmp_path).records
@@ -365,9 +410,36 @@ def test_clickers_are_read_by_a_layout_that_does_not_tell_where_they_stand(tmp_p
     assert [entry.setting for entry in read_back(tmp_path, files).entries] == ["click1", "click5"]
 
 
+DAMPERS = {
+    "LF_0.5Hz RF_1.0Hz": "LF RF",
+    "sine_2Hz_front_left sine_2Hz_rear_left": "front_left rear_left",
+    "SN1041_sine SN1042_sine": "SN1041 SN1042",
+    "run_damper-1_a run_damper-2_a": "damper-1 damper-2",
+    "LF_C12_R8_15in_s RF_C12_R8_15in_s": "LF_C12_R8 RF_C12_R8",
+    "C4_R8_LF_15in_s C12_R8_LR_15in_s": "C12_R8_LR C4_R8_LF",
+    "LF_15in_s_click5 RF_15in_s_click1": "LF_click5 RF_click1",
+    "FR_3Hz_150V FL_3Hz_150V": "FL FR",
+}
+
+
+@pytest.mark.parametrize("among_others", [False, True])
+@pytest.mark.parametrize("names", DAMPERS)
+def test_dampers_of_several_corners_or_numbers_are_settings(tmp_path: Path, names: str, among_others: bool) -> None:
+    """One fit to two dampers is neither."""
+    columns = [numbers(values) for values in (TIME, X, FORCE)]
+    head = ["time_s,displacement_m,force_N"]
+    files = [stored(tmp_path / "data" / f"{stem}.csv", head, columns, ",") for stem in names.split()]
+    if among_others:
+        stored(tmp_path / "data" / "of_another_day.csv", head, columns, ",")
+    entries = read_back(tmp_path, files).entries
+    assert sorted(entry.setting or "" for entry in entries) == DAMPERS[names].split()
+    assert load(tmp_path / "guess.yaml").setting == DAMPERS[names].split()[0]
+    assert {entry.voltage_V for entry in entries} == ({150.0} if "V" in names else {None})
+
+
 def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, X, FORCE)]
-    for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a")):
+    for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a"), ("LF-a", "LF-b")):
         files = [
             stored(tmp_path / names[1] / f"{name}.csv", ["time_s,displacement_m,force_N"], columns, ",")
             for name in names

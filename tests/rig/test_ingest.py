@@ -310,6 +310,15 @@ def test_a_clock_of_too_few_digits_is_reported_with_what_to_do_about_it(tmp_path
     assert "; it has too few digits; say rate_Hz: 3000 or what is known of it, and leave out the column" in said
 
 
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_a_clock_of_too_few_ticks_tells_no_rate(tmp_path: Path, ticks: int) -> None:
+    """Two seconds at 500 Hz, whose clock goes on once, are no 999 Hz."""
+    clock = 10.0 + np.floor(np.arange(TIME.size) * (ticks + 0.5) / TIME.size)
+    write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": clock}))
+    (said,) = refused(tmp_path)
+    assert "; it has too few digits; say rate_Hz: N for N samples a second, which this clock does not tell" in said
+
+
 def test_a_clock_that_never_goes_on_is_reported_no_rate(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.zeros(TIME.size)}))
     assert any("time does not increase" in line for line in refused(tmp_path))

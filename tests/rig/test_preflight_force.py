@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pzd.artefacts import Finding, RecordEntry
 from pzd.damper.element import element_force
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
 from pzd.rig.preflight import PreflightRecord, force, reference
-from pzd.rig.preflight.force import delay
+from pzd.rig.preflight.force import delay, explain_offsets
 from pzd.rig.preflight.reference import ReferenceFit, Section
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -73,3 +74,29 @@ def test_delays_are_looked_for_only_where_the_element_leaves_something(
     assert asked == [1]  # the undelayed fit alone
     list(delay(measured(x, other)))
     assert asked[2:] == [61, *[21] * (len(asked) - 3)]
+
+
+def explained(offsets: list[float]) -> list[str]:
+    """What the preflight says of tests with these offsets, at speeds in no order with them."""
+    entries = [
+        RecordEntry(
+            name=f"test {n}",
+            setting=None,
+            voltage_V=None,
+            temperature_degC=None,
+            rate_Hz=500.0,
+            cycles=6.0,
+            velocity_rms_m_per_s=0.1 * (1 + n % 3),
+            force_rms_N=100.0 * (1 + n % 3),
+            findings=(Finding(check="offset", where="force", size=size, unit="N", follows="at first"),),
+        )
+        for n, size in enumerate(offsets)
+    ]
+    return [entry.findings[0].follows for entry in explain_offsets(tuple(entries))]
+
+
+def test_the_middle_of_two_groups_of_offsets_is_no_usual_one() -> None:
+    """No file has it, and taken out it would leave two wrong offsets."""
+    assert explained([-149.8, -149.8, -149.9, -79.9, -79.9, -79.8]) == ["at first"] * 6
+    told = explained([-149.8, -149.8, -149.9, -149.7, -149.8, -20.0])
+    assert told[5].startswith("-149.8 N is usual in this setting: a tare that changed")

@@ -173,6 +173,17 @@ def test_a_header_below_a_blank_line_and_a_title_among_the_data_is_named_as_such
     assert "a.csv:504: the header stands here again and once more below" in said
 
 
+@pytest.mark.parametrize("again", ["Time [s],Pos [in],Force [N]", "Time [s],Force [N],Pos [mm]", "Time,Pos,Force,Temp"])
+def test_a_header_in_another_unit_or_order_among_the_data_is_named_as_such(tmp_path: Path, again: str) -> None:
+    """With the line taken out inches would be read as millimetres, and a force as a displacement."""
+    rows = lines(CANONICAL)[1:]
+    path = write(tmp_path / "a.csv", ["Time [s],Pos [mm],Force [N]", *rows, again, *rows])
+    columns = {"time": "Time [s]", "displacement": "Pos [mm]", "force": "Force [N]"}
+    (said,) = refused(tmp_path, {"path": path.name, "columns": columns})
+    assert f"a.csv:502: the header stands here again, as {again.replace(',', ', ')}: another recording" in said
+    assert "a file of its own, cut above this line" in said
+
+
 @pytest.mark.parametrize(("cell", "decimal"), [("1.129,", ","), ("1,129.9", "."), ("-12 129,9", ",")])
 def test_grouped_thousands_are_reported_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
     text = [line.replace(".", decimal) for line in lines(CANONICAL, separator=";")]

@@ -29,6 +29,8 @@ READ = [
     ("m s^-1", VELOCITY, 1.0),
     ("kg m/s2", LOAD, 1.0),
     ("lbs", LOAD, 4.4482216),
+    ("Lbs", LOAD, 4.4482216),
+    ("in.", DISPLACEMENT, 0.0254),
     ("980.665 N", LOAD, 980.665),
     ("kgf/cm2", PRESSURE, 98066.5),
     ("lbf/in**2", PRESSURE, 6894.757),
@@ -44,6 +46,27 @@ def test_products_quotients_and_powers_are_read(unit: str, quantity: Quantity, o
             to_canonical(np.ones(1), unit, quantity)
     else:
         assert to_canonical(np.ones(1), unit, quantity)[0] == pytest.approx(one, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "one"), [("kg", LOAD, 9.80665), ("lb", LOAD, 4.4482216), ("ips", VELOCITY, 0.0254)]
+)
+def test_what_is_meant_by_a_unit_of_another_quantity_is_offered_and_read(
+    unit: str, quantity: Quantity, one: float
+) -> None:
+    with pytest.raises(UnitError) as caught:
+        to_canonical(np.ones(1), unit, quantity)
+    (meant,) = re.findall(r"; write '(\S+)' ", str(caught.value))
+    assert to_canonical(np.ones(1), meant, quantity)[0] == pytest.approx(one, rel=1e-6)
+    with pytest.raises(UnitError, match="write one like 'degC'"):
+        to_canonical(np.ones(1), unit, TEMPERATURE)
+
+
+def test_init_asks_with_the_unit_that_is_meant(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", lines({"t(ms)": 1e3 * TIME, "s(in.)": X / 0.0254, "F(kg)": FORCE / 9.80665}))
+    text = guessed([path])
+    assert "        force:   # fill in: F(kg) is in kg: write 'kgf' where kilogram-force are meant" in text
+    assert sum("fill in" in line for line in text) == 1
 
 
 NO_UNITS = [

@@ -25,8 +25,8 @@ from pzd.schema.yamltree import written
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
-COMPRESSION = re.compile(r"compr|druckkraft|einfed|einschub", re.IGNORECASE)
-"""Words in the header of a channel that counts compression positive."""
+COMPRESSION = re.compile(r"compr|^\W*comp(?![a-z])|druckkraft|einfed|einschub", re.IGNORECASE)
+"""Words in the header of a channel that counts compression positive; behind a name comp is what was compensated."""
 OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities whose column may be wholly empty, which counts as absent."""
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")

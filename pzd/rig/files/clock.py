@@ -6,17 +6,20 @@ A clock that is misread makes another damper: its damping coefficient is wrong b
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.quantities import DISPLACEMENT, TIME
 from pzd.record import Array, clock_fault
+from pzd.rig.config import FilesEntry
 from pzd.rig.files.channels import RawRecord, day_and_month_exchanged, instants
+from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout
-from pzd.rig.files.sheet import Sheet
-from pzd.schema.errors import Advice, Advised, DataError
+from pzd.rig.files.sheet import Sheet, Wanted
+from pzd.schema.errors import Advice, Advised, DataError, UserError
 from pzd.schema.yamltree import written
 from pzd.signals.measures import slope
 
@@ -30,6 +33,8 @@ CREEPING = 5e-3
 """where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
 OFTEN = 0.01
 """Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
+FEWEST_TICKS = 3
+"""Times that a clock with too few digits must go on to tell a rate: two whole ticks lie between them."""
 LONGEST_PAUSE = 600.0
 """Pause [s] that no test has, where it is longer than all the rest of the record as well."""
 MOST_LOST = 1_000_000
@@ -49,7 +54,7 @@ def clock_faults(test: RawRecord, layout: Layout) -> list[str]:
     return _jump(test, layout) or _two_rates(test) or _sample_numbers(test, layout) or _milliseconds(test, layout)
 
 
-def standstills(test: RawRecord) -> list[str]:
+def standstills(test: RawRecord, layout: Layout) -> list[str]:
     """Describe where the clock stands still or goes back; NaN is reported as a bad cell."""
     time = test.channels[TIME]
     fault = clock_fault(time)
@@ -62,29 +67,89 @@ def standstills(test: RawRecord) -> list[str]:
     if steps.max() == 0.0:
         return [told]
     if steps.min() < 0.0:
-        return [_goes_back(test, told, steps)]
+        return [_goes_back(test, layout, told, steps)]
     if np.mean(steps == 0.0) < OFTEN:
         return [f"{told}; take the rows that repeat a time out"]
-    goes_on = np.flatnonzero(steps > 0.0) + 1  # the first stamp and the last may not be whole ones
-    first, last = (goes_on[0], goes_on[-1]) if goes_on.size > 1 else (0, time.size - 1)
+    return [_too_few_digits(told, time)]
+
+
+def _too_few_digits(told: str, time: Array) -> str:
+    """Say that a clock stands still between its ticks, and the rate that whole ticks tell."""
+    goes_on = np.flatnonzero(np.diff(time) > 0.0) + 1  # the first stamp and the last may not be whole ones
+    if goes_on.size < FEWEST_TICKS:
+        when = "for N samples a second, which this clock does not tell, and leave out the column of the time"
+        return Advised(f"{told}; it has too few digits;", Advice("rate_Hz", "N", when=when))
+    first, last = goes_on[0], goes_on[-1]
     rate = (last - first) / (time[last] - time[first])
     when = "or what is known of it, and leave out the column of the time"
-    return [Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))]
+    return Advised(f"{told}; it has too few digits;", Advice("rate_Hz", f"{rate:.5g}", when=when))
 
 
-def _goes_back(test: RawRecord, told: str, steps: Array) -> str:
+def _goes_back(test: RawRecord, layout: Layout, told: str, steps: Array) -> str:
     """Say what a clock does that goes back here and there: a counter begins again, or another test."""
     time = test.channels[TIME]
     if wraps_at := _wraps_at(time, steps):
         rate = Advice("rate_Hz", f"{1.0 / np.median(steps):.5g}", when="and leave out the column of the time")
         what = f"the clock begins again after {wraps_at} ticks, a counter of so many bits;"
         return Advised(f"{test.place(int(np.argmin(steps)) + 1)}: {what}", rate)
-    when = "with the column that numbers the tests, or write each into a file of its own"
-    again = Advised(f"{told}; another test begins there;", Advice("split", "{column: HEADER}", when=when))
     goes_on = time[1:][steps < 0.0]
     far_back = np.all(goes_on < time[:-1][steps < 0.0] - 0.5 * np.ptp(time))
     begins = bool(far_back or np.all(np.abs(goes_on - time[0]) <= np.median(steps)))  # tests differ in length
-    return again if begins else told
+    return _other_tests(test, layout, f"{told}; another test begins there", steps) if begins else told
+
+
+def _other_tests(test: RawRecord, layout: Layout, told: str, steps: Array) -> str:
+    """Say how to cut a file at the rows at which its clock begins again: by a column that numbers the tests, if any."""
+    read = {head for spec in layout.channels for head in spec.headers}
+    heads = [head for head in dict.fromkeys(test.sheet.header) if head.strip() and head not in read]
+    falls = np.flatnonzero(steps < 0.0) + 1
+    part = range(test.first + 1, test.first + test.channels[TIME].size)
+    column, tells_some = numbering_column(test.sheet.path, layout.entry, heads, {part[n - 1] for n in falls}, part)
+    own = "write each into a file of its own"
+    if column is not None:
+        return Advised(f"{told};", Advice("split", f"{{column: {written(column)}}}", when=f"or {own}"))
+    if tells_some is not None:
+        return f"{told}; column {tells_some!r} tells only some of them apart: {own}"
+    if layout.entry.split is not None:
+        return f"{told}: {own}"
+    gap = _two_digits(10.0 * float(steps.max()))
+    when = f"which cuts where the clock goes back as well, or {own}"
+    return Advised(f"{told};", Advice("split", f"{{gap_s: {gap}}}", when=when))
+
+
+def numbering_column(
+    path: Path, entry: FilesEntry, heads: Sequence[str], falls: Collection[int], part: range
+) -> tuple[str | None, str | None]:
+    """Find the column that numbers the tests of a file, whose clock begins again with each.
+
+    Parameters
+    ----------
+    path : the file
+    entry : how it is read
+    heads : of the columns that hold nothing else
+    falls : rows at which the clock begins again
+    part : rows of the file that are looked at, but for the first of them
+
+    Returns
+    -------
+    the column whose label changes at these rows and nowhere else, None without; and one whose label changes at some of
+    them alone
+    """
+    begins, some = {*falls}, None
+    for head in heads:  # one at a time, for the sake of the memory
+        try:
+            sheet = read_sheet(path, entry, Wanted(texts=frozenset((head,))), "rig.files")
+        except UserError:
+            continue
+        cells = sheet.texts.get(sheet.header.index(head), []) if head in sheet.header else []
+        if len(cells) < part.stop:
+            continue
+        changes = {row for row in part if cells[row] != cells[row - 1]}
+        if changes == begins:
+            return head, some
+        if changes and changes < begins:
+            some = head
+    return None, some
 
 
 def _wraps_at(time: Array, steps: Array) -> int | None:

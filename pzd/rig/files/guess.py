@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 
 from pzd.quantities import (
     ACCELERATION,
+    CHANNELS,
     DISPLACEMENT,
     FORCE,
     TEMPERATURE,
@@ -24,7 +25,9 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
-from pzd.rig.files.dialect import BLANKS
+from pzd.rig.files.channels import COMPRESSION
+from pzd.rig.files.clock import numbering_column
+from pzd.rig.files.dialect import BLANKS, ROW_NAMES
 from pzd.rig.files.formats import TEXT, lines_above, read_sheet
 from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, number_in_name, own_quantity
 from pzd.rig.files.reading import read
@@ -39,15 +42,17 @@ from pzd.rig.files.sniffing import (
     described,
     doubt_in_names,
     is_canonical,
+    is_in_unit,
     one_pattern,
     quantity_of,
     said_above,
     setting_in_names,
     setting_of,
+    settings_apart,
     unit_of,
     value_in_names,
 )
-from pzd.rig.files.units import RECORDED, columns_under, factor_in, in_header
+from pzd.rig.files.units import RECORDED, columns_under, factor_in, in_header, meant_by
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.measures import work
@@ -177,37 +182,40 @@ class SniffedFile:
         )
 
 
-def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
-    """Make the entries of files that a layout fits."""
+def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path], among: Sequence[str]) -> Iterator[GuessedEntry]:
+    """Make the entries of files that a layout fits; `among` are the names of all files."""
     quantities = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
     quantities |= set(layout.split.constants) if layout.split else set()
     controlled = not quantities.isdisjoint((VOLTAGE.name, layout.control.signal().name))
-    for path, members in _patterns(paths):
+    for path, members, setting, in_names in _by_setting(paths, among):
         lines = [f"    - path: {written(path)}", f"      layout: {name}    # {layout.about}"]
-        pattern = layout.pattern or setting_in_names([file.stem for file in members])
+        pattern = layout.pattern or in_names
+        lines += [f"      {_setting_key(setting)}"] if setting and pattern is None else []
         if pattern != layout.pattern:
             lines.append(f"      {_pattern_key(pattern)}")
-        yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file) for file in members))
+        settings = tuple(setting or setting_of(pattern, file) for file in members)
+        yield GuessedEntry(tuple(lines), controlled, settings)
 
 
-def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[GuessedEntry]:
-    """Make the entries of files from their headers."""
+def by_headers(found: Sequence[SniffedFile], control: Control, among: Sequence[str]) -> Iterator[GuessedEntry]:
+    """Make the entries of files from their headers; `among` are the names of all files."""
     groups: dict[tuple[object, ...], list[SniffedFile]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
         levels = _levels_of_folders([file.path for file in group], control)
         above = [text for file in group for text in file.above]
-        for path, members in _patterns([file.path for file in group]):
+        for path, members, setting, in_names in _by_setting([file.path for file in group], among):
             mine = [file for file in group if file.path in members]
             d = mine[0].dialect
             columns = dict(mine[0].columns) if d.headless else _told(d, control)
-            pattern, units = _from_names(mine, columns, control)
+            pattern, units = _from_names(mine, columns, control, in_names)
             unknown = [q for q in (VOLTAGE, TEMPERATURE) if not {q, own_quantity(q, control).name} & {*columns, *units}]
             preamble, said = said_above(above, unknown, control)
             lines = [f"    - path: {written(path)}"]
             lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units | said)]
+            lines += [f"      {_setting_key(setting)}"] if setting else []
             if preamble:
                 lines.append(f"      preamble: {written(preamble)}    # in the lines above the header")
             asked = doubt_in_names([file.path.stem for file in mine]) is not None
@@ -215,7 +223,8 @@ def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[Guess
             if not controlled and (level := levels.get(mine[0].path.parent)):
                 lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
                 controlled = True
-            yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file.path) for file in mine))
+            settings = tuple(setting or setting_of(pattern, file.path) for file in mine)
+            yield GuessedEntry(tuple(lines), controlled, settings)
 
 
 def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, str]:
@@ -235,14 +244,16 @@ def _told(dialect: Dialect, control: Control) -> dict[Quantity, str]:
 
 
 def _from_names(
-    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
+    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control, setting: str | None
 ) -> tuple[str | None, dict[str, str | None]]:
-    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
+    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it.
+
+    `setting` is the part of it that finds the setting.
+    """
     names = [file.path.stem for file in files]
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
     wanted = [name for quantity, name in labels.items() if quantity not in columns]
     values = {name: value for name in wanted if (value := value_in_names(names, name))}
-    setting = setting_in_names(names)
     pattern = one_pattern([pattern for pattern, _ in values.values()] + ([setting] if setting else []), names)
     return pattern, {name: unit for name, (_, unit) in values.items()} if pattern else {}
 
@@ -263,10 +274,11 @@ def _keys(
     if TIME in missing and (rate := _sampling_rate(files[0], columns)):
         missing.remove(TIME)
         yield rate
+    offered = _offered(files[0], columns, missing, several)
     if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        yield from _asked_columns(files[0], columns, missing, several)
+        yield from _asked_columns(offered)
     units = [*_units(named, dialect), *(f"  {name}: {written(unit)}" for name, unit in in_names.items() if unit)]
     units += [
         f"  {name}:   # fill in: the unit of {name} in the files' names"
@@ -284,9 +296,28 @@ def _keys(
         yield _asked_pattern(*doubt, pattern, stems)
     elif pattern:
         yield _pattern_key(pattern)
-    yield from _events(files[0])
-    if not missing and any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
+    taken = {*chain(*offered.values())}
+    if (event := _event(files[0])) is not None:
+        yield event
+        taken.add(dialect.header[-1])
+    elif (column := _numbering(files[0], columns, taken)) is not None:
+        yield f"split: {{column: {written(column)}}}    # the clock begins again where its label changes"
+        taken.add(column)
+    if not dialect.headless and (unread := _not_read(files[0], columns, taken, control)):
+        yield unread
+    if not missing:
+        yield from _signs(files, columns)
+
+
+def _signs(files: Sequence[SniffedFile], columns: dict[Quantity, str]) -> Iterator[str]:
+    """Write the sign where the work tells that it is wrong, or else that headers name compression."""
+    compressed = {q: columns[q] for q in (DISPLACEMENT, FORCE) if COMPRESSION.search(columns[q])}
+    if any(_turned(file, columns) for file in files) and not _recorded(files[0], columns):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
+    elif compressed:
+        by = " and ".join(" ".join(head.split()) for head in compressed.values())
+        turned = ", ".join(f"{quantity.name}: -1" for quantity in compressed)
+        yield f"# compression, by {by}: where it is positive, say sign: {{{turned}}}"
 
 
 def _sampling_rate(file: SniffedFile, columns: dict[Quantity, str]) -> str | None:
@@ -308,22 +339,47 @@ def _counts_rows(file: SniffedFile, head: str) -> bool:
     return numbers.size > 1 and bool(np.all(np.diff(numbers) == 1.0))
 
 
-def _asked_columns(
+def _offered(
     file: SniffedFile,
     columns: dict[Quantity, str],
     missing: Sequence[Quantity],
     several: Mapping[Quantity, Sequence[str]],
-) -> Iterator[str]:
+) -> dict[Quantity, list[str]]:
+    """Return by quantity that only a person can find the headers that may be it."""
+    return {quantity: [*several.get(quantity, _candidates(file, columns, quantity))] for quantity in missing}
+
+
+def _asked_columns(offered: Mapping[Quantity, list[str]]) -> Iterator[str]:
     """Write the empty places of columns that only a person knows, each with those that may stand there."""
-    offered: list[list[str]] = []
-    for quantity in missing:
-        free = [*several.get(quantity, _candidates(file, columns, quantity))]
+    shown: list[list[str]] = []
+    for quantity, free in offered.items():
         counted = "; or say rate_Hz: N instead, where no column holds it" if quantity is TIME else ""
-        if free in offered:
+        if free in shown:
             yield f"  {quantity.name}:   # fill in: one of the others of these{counted}"
         else:
             yield f"  {quantity.name}:   # fill in: one of {', '.join(free) or 'none that is seen'}{counted}"
-        offered.append(free)
+        shown.append(free)
+
+
+def _not_read(file: SniffedFile, columns: Mapping[Quantity, str], asked: Collection[str], control: Control) -> str:
+    """Write which columns stay unread, and what each may be; empty where all of them are read or asked for."""
+    named = [head for head in file.dialect.header if head.strip() and head != ROW_NAMES]
+    left = dict.fromkeys(head for head in named if head not in columns.values() and head not in asked)
+    told = [" ".join(head.split()) + _what_it_may_be(file, head, columns, control) for head in left]
+    return f"# not read: {', '.join(told)}" if told else ""
+
+
+def _what_it_may_be(file: SniffedFile, head: str, columns: Mapping[Quantity, str], control: Control) -> str:
+    """Say in brackets which quantity a column that is not read may be; empty where nothing tells."""
+    named = quantity_of(head, file.unit_below(head, own_quantity(VOLTAGE, control)), control)
+    by_unit = (each for each in CHANNELS if each is not VOLTAGE and is_in_unit(head, file.unit_below(head, each), each))
+    quantity = named or next(by_unit, None)
+    if quantity is not None:
+        name = own_quantity(quantity, control).name
+        return f" (another {name})" if quantity in columns else f" (may be the {name})"
+    signals = (own_quantity(VOLTAGE, each) for each in CONTROLS)
+    signal = any(is_in_unit(head, file.unit_below(head, each), each) for each in signals)
+    return " (may be a control signal)" if signal else ""
 
 
 def _asked_units(file: SniffedFile, columns: dict[Quantity, str], missing: Sequence[Quantity]) -> Iterator[str]:
@@ -374,6 +430,21 @@ def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
         else:
             found += [(path.as_posix(), [path]) for path in mine]
     return found
+
+
+def _by_setting(
+    paths: Sequence[Path], among: Sequence[str]
+) -> Iterator[tuple[str, Sequence[Path], str | None, str | None]]:
+    """Yield a path pattern, its files, and their setting or else the pattern that finds it in their names."""
+    apart: Sequence[str | None] = settings_apart([path.stem for path in paths], among) or [None] * len(paths)
+    for setting in dict.fromkeys(apart):
+        mine = [path for path, its in zip(paths, apart, strict=True) if its == setting]
+        for path, members in _patterns(mine):
+            yield path, members, setting, None if setting else setting_in_names([m.stem for m in members], among)
+
+
+def _setting_key(setting: str) -> str:
+    return f"setting: {written(setting)}    # from the files' names"
 
 
 def _pattern_key(pattern: str | None) -> str:
@@ -444,6 +515,8 @@ def _lacking(column: str, below: str | None, quantity: Quantity) -> str:
             f"is in {recorded}: what one of these stands for, e.g. 200 {quantity.unit}; with its zero "
             f"-200 {quantity.unit}/{recorded} about 2.5 {recorded}, or about the mean of the first 10"
         )
+    if recorded and (advice := meant_by(recorded, quantity)):
+        return f"is in {recorded}: {advice}"
     if factor_in(column):
         return f"names a factor: what one recorded unit stands for, e.g. {quantity.unit}"
     return f"names no unit, e.g. {quantity.unit}"
@@ -466,19 +539,32 @@ def _date_format(cell: str) -> str | None:
     return None
 
 
-def _events(file: SniffedFile) -> Iterator[str]:
+def _numbering(file: SniffedFile, columns: Mapping[Quantity, str], taken: Collection[str]) -> str | None:
+    """Return the header of the column that numbers the tests of a file, whose clock begins again with each."""
+    head = columns.get(TIME, "")
+    free = [each for each in file.dialect.header if each.strip() and each not in {*columns.values(), *taken}]
+    entry = _as_sniffed(file)
+    try:
+        sheet = read_sheet(file.path, entry, Wanted(numbers=frozenset((head,))), "rig.files")
+    except DataError:
+        return None
+    time = sheet.numbers.get(sheet.header.index(head), np.empty(0)) if head in sheet.header else np.empty(0)
+    falls = np.flatnonzero(np.diff(time) < 0.0) + 1
+    return numbering_column(file.path, entry, free, falls.tolist(), range(1, time.size))[0] if falls.size else None
+
+
+def _event(file: SniffedFile) -> str | None:
     """Write how to cut a file of a logger that was paused, by the event in its last column with which it went on."""
     head = file.dialect.header[-1]
     if file.form != TEXT or not _EVENTS.search(head):
-        return
+        return None
     wanted = Wanted(texts=frozenset((head,)))
     try:
         sheet = read_sheet(file.path, _as_sniffed(file, FileSplit(event=head, begins=" ")), wanted, "rig.files")
     except DataError:
-        return
+        return None
     later = [text for text in sheet.texts[sheet.header.index(head)][1:] if _GOES_ON.search(text)]
-    if later:
-        yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
+    return f"split: {{event: {written(head)}, begins: {written(later[0])}}}" if later else None
 
 
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
@@ -541,9 +627,10 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
     fitting, found = _by_fit(files, layout)
+    among = [path.stem for path in files]
     control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
-    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths)]
-    entries += by_headers(found, control)
+    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths, among)]
+    entries += by_headers(found, control, among)
     lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if fitting:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
@@ -668,10 +755,13 @@ def _no_test_of_a_damper(file: SniffedFile, columns: dict[Quantity, str]) -> str
     heads = [head for head in file.dialect.header if head.strip()]
     if TIME not in columns and _FREQUENCY.search(heads[0]) and columns.get(FORCE, heads[0]) == heads[0]:
         return "levels over frequency, as of third octaves, and no recording over time: a test of a damper is needed"
-    if {VELOCITY, FORCE} <= set(columns) and not {TIME, DISPLACEMENT} & set(columns) and len(heads) <= len(columns) + 1:
+    both_ways = all(any(pattern.search(head) for head in heads) for pattern in DIRECTIONS.values())
+    forces = 2 if both_ways and FORCE not in columns else int(FORCE in columns)
+    timeless = VELOCITY in columns and not {TIME, DISPLACEMENT} & set(columns)
+    if timeless and forces and len(heads) <= len({*columns} - {FORCE}) + forces + 1:
         curve = "a curve of force over velocity, and no recording over time: in place of a rig take it by damper: "
         path = file.path.as_posix()
-        if all(any(pattern.search(head) for head in heads) for pattern in DIRECTIONS.values()):
+        if both_ways:
             return f"{curve}{{curve: {path}}}"
         return f"{curve}{{curve: {path}, sign: 1}}, or sign: -1 where positive velocities compress"
     accelerations = [

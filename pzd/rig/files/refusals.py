@@ -179,11 +179,11 @@ def refuse(tests: Sequence[RawRecord], layout: Layout) -> None:
 def _faults(test: RawRecord, layout: Layout) -> list[str]:
     if test.faults:
         readable = test.whole and TIME in test.channels
-        return [*test.faults, *(standstills(test) if readable else [])]
+        return [*test.faults, *(standstills(test, layout) if readable else [])]
     time, x, force = test.channels[TIME], test.channels[DISPLACEMENT], test.channels[FORCE]
     if time.size < 2:
         return [f"{test.place(0)}: only one data row"]
-    backwards = standstills(test)
+    backwards = standstills(test, layout)
     still = [
         f"{test.place(0)}: {quantity.name} is constant over the whole test (got {values[0]:.6g} {quantity.unit})"
         for quantity, values in ((DISPLACEMENT, x), (FORCE, force))

@@ -156,7 +156,28 @@ def claims(headers: Sequence[str], units: Sequence[str] | None, control: Control
             found[quantity] = (best, [header])
         elif best == found[quantity][0] and _bare(header) not in map(_bare, found[quantity][1]):
             found[quantity][1].append(header)
-    return {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
+    named = {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
+    warm = [] if TEMPERATURE in named else _warm_without_a_name(headers, units, control)
+    return {**named, TEMPERATURE: warm} if len(warm) == 1 else named
+
+
+def _warm_without_a_name(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> list[str]:
+    """Return the headers of no quantity that a unit of temperature follows: `oil [degC]`."""
+    below: Sequence[str | None] = units or [None] * len(headers)
+    return [
+        header
+        for header, unit in zip(headers, below, strict=True)
+        if quantity_of(header, unit, control) is None
+        and is_in_unit(header, unit, TEMPERATURE)
+        and not _NOT_THE_ONE.search(_bare(header))
+    ]
+
+
+def is_in_unit(header: str, below: str | None, quantity: Quantity) -> bool:
+    """Whether a unit of a quantity stands in a header or below it; a last letter may be the name of a channel."""
+    last = _LAST_WORD.search(header)
+    named = bool(below and below.strip("[]() ")) or in_header(header, quantity) or (last and len(last[1]) > 1)
+    return bool(named) and unit_of(header, below, quantity) is not None
 
 
 def is_canonical(header: str, quantity: Quantity, control: Control) -> bool:
@@ -247,6 +268,13 @@ _WORDS_IN_NAMES = {
 """Words before a number whose unit may be missing: current=0.5, pwm40."""
 _CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
 """C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
+_DAMPERS = (
+    "LF|LR|RF|RR|FL|FR|RL|lf|lr|rf|rr|fl|fr|rl",
+    "(?i:(?:front|rear)[ _-]?(?:left|right)|(?:left|right)[ _-]?(?:front|rear)|front|rear|left|right)",
+    "(?i:S/?N[ _-]?[0-9]+)",
+    "(?i:(?:damper|shock)[ _-]?[0-9]+)",
+)
+"""Corner, axle or side of a car, serial number or number of a damper: LF, front_left, SN1041, damper 1."""
 
 
 def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str | None] | None:
@@ -378,10 +406,53 @@ def _two_numbers(stem: str, match: re.Match[str]) -> str | None:
     return stem[before.start() : match.end()] if before and match[1].isdigit() and len(match[1]) < 3 else None
 
 
-def setting_in_names(stems: Sequence[str]) -> str | None:
-    """Return the pattern that finds the position of the clickers in every name; None where a name lacks it."""
-    patterns = (f"(?<![A-Za-z0-9])(?P<setting>{clickers})(?![A-Za-z0-9])" for clickers in _CLICKERS)
-    return next((one for one in patterns if all(re.search(one, stem) for stem in stems)), None)
+def setting_in_names(stems: Sequence[str], among: Sequence[str]) -> str | None:
+    """Return the pattern that finds which damper, and the position of its clickers, in every name; None without either.
+
+    Parameters
+    ----------
+    stems : names of the files that one pattern is for, without their ending
+    among : names of all files; which damper it is counts where there are several
+    """
+    damper, clickers = _damper_in_names(stems, among), next((one for one in _CLICKERS if _in_each(one, stems)), None)
+    if damper is None or clickers is None:
+        only = damper or clickers
+        return _as_setting(only) if only else None
+    ways = (f"(?:{damper})[ _-]*(?:{clickers})", f"(?:{clickers})[ _-]*(?:{damper})")
+    return next((_as_setting(way) for way in ways if _in_each(way, stems)), None)
+
+
+def settings_apart(stems: Sequence[str], among: Sequence[str]) -> list[str] | None:
+    """Return the setting of each name where damper and clickers stand too far apart in the names for one pattern.
+
+    Examples
+    --------
+    >>> names = ["LF_2in_s_click5", "RF_2in_s_click5"]
+    >>> settings_apart(names, among=names)
+    ['LF_click5', 'RF_click5']
+    """
+    damper, clickers = _damper_in_names(stems, among), next((one for one in _CLICKERS if _in_each(one, stems)), None)
+    if damper is None or clickers is None or setting_in_names(stems, among) is not None:
+        return None
+    both = [[re.search(_as_setting(one), stem) for one in (damper, clickers)] for stem in stems]
+    return ["_".join(match["setting"] for match in matches if match) for matches in both]
+
+
+def _damper_in_names(stems: Sequence[str], among: Sequence[str]) -> str | None:
+    """Return the pattern of which damper it is: one in every name, and not the same in all files."""
+    for one in _DAMPERS:
+        found = {stem: {match["setting"] for match in re.finditer(_as_setting(one), stem)} for stem in among}
+        if all(len(found[stem]) == 1 for stem in stems) and len(set[str]().union(*found.values())) > 1:
+            return one
+    return None
+
+
+def _in_each(pattern: str, stems: Sequence[str]) -> bool:
+    return all(re.search(_as_setting(pattern), stem) for stem in stems)
+
+
+def _as_setting(pattern: str) -> str:
+    return f"(?<![A-Za-z0-9])(?P<setting>{pattern})(?![A-Za-z0-9])"
 
 
 def one_pattern(patterns: Sequence[str], stems: Sequence[str]) -> str | None:

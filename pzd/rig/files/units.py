@@ -41,13 +41,14 @@ SPELLINGS = {
     **dict.fromkeys(("Millimeters", "Millimeter", "Millimetres"), "mm"),
     **dict.fromkeys(("Seconds", "Second", "secs"), "s"),
     "lbs": "lbf",
+    "in.": "inch",
     # Of headers in capitals throughout, as old test stands write them.
     "KN": "kN",
     "MM": "mm",
     "CM": "cm",
     **dict.fromkeys(("S", "SEC", "SECONDS"), "s"),
     "MSEC": "ms",
-    **dict.fromkeys(("LBS", "LBF"), "lbf"),
+    **dict.fromkeys(("LBS", "Lbs", "LBF"), "lbf"),
     "KGF": "kgf",
     **dict.fromkeys(("IN", "INCH", "INCHES"), "inch"),
     "VOLTS": "V",
@@ -79,6 +80,12 @@ SPELLINGS = {
     **dict.fromkeys(("\u2103", "\u6444\u6c0f\u5ea6"), "degC"),
 }
 """Spellings of loggers that pint does not know, or takes for other units: the `lbs` of a rig are pounds of force."""
+_MEANT = {
+    **dict.fromkeys(("kg", "Kg", "KG", "kgs"), ("kgf", "where kilogram-force are meant")),
+    **dict.fromkeys(("lb", "LB"), ("lbf", "where pounds of force are meant")),
+    **dict.fromkeys(("ips", "IPS"), ("in/s", "for inches a second")),
+}
+"""What is often written and no unit of the quantity as it stands: what to write for it, and what that means."""
 LONGEST = 40
 """Characters of the longest unit that is read."""
 MOST_FACTORS = 6
@@ -171,10 +178,28 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
         with np.errstate(over="ignore"):  # what is too large is refused as that
             converted = _registry().Quantity(values, _parsed(unit)).to(_parsed(quantity.unit))
     except (pint.PintError, ValueError, AttributeError, TypeError, KeyError, ArithmeticError) as error:
-        raise UnitError(
-            f"{quantity.name}: {unit!r} is no unit of it ({_one_line(error)}); write one like {quantity.unit!r}"
-        ) from None
+        advice = meant_by(unit, quantity) or f"write one like {quantity.unit!r}"
+        raise UnitError(f"{quantity.name}: {unit!r} is no unit of it ({_one_line(error)}); {advice}") from None
     return np.asarray(converted.magnitude, dtype=np.float64)
+
+
+def meant_by(unit: str, quantity: Quantity) -> str | None:
+    """Say what to write for a unit that is often written and none of a quantity; None where it may mean anything.
+
+    Examples
+    --------
+    >>> from pzd.quantities import FORCE
+    >>> meant_by("kg", FORCE)
+    "write 'kgf' where kilogram-force are meant"
+    """
+    if unit not in _MEANT:
+        return None
+    meant, what = _MEANT[unit]
+    try:
+        to_canonical(np.zeros(1), meant, quantity)
+    except UnitError:
+        return None
+    return f"write {meant!r} {what}"
 
 
 def constant(text: str, quantity: Quantity) -> float:

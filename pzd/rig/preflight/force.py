@@ -38,6 +38,7 @@ BY_CHANCE = 0.02
 """P value below which offsets rise or fall with the speed by no chance: five in order throughout have 1/60."""
 OF_FEW = 0.34
 """P value of three in order, 1/3: no proof, but reason enough to take nothing out as a tare."""
+FEW_IN_ORDER = "it goes with the speed of the few tests, as where rebound is unlike compression"
 LEAST_SLIP = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -78,6 +79,8 @@ def explain_offsets(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]
 def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
     mine, offsets = _offset_of(entry), [_offset_of(other) for other in entries]
     usual = float(np.median(offsets))
+    # The median of two groups is the offset of neither.
+    any_usual = np.mean(np.abs(np.array(offsets) - usual) <= ALIKE_OFFSETS * abs(usual)) > 0.5
     if mine == 0.0 or len(offsets) < LEAST_RECORDS:
         return entry
     if np.ptp(offsets) <= ALIKE_OFFSETS * abs(usual):
@@ -86,13 +89,14 @@ def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
         follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
     elif _in_order_of(entries, "force_rms_N") <= BY_CHANCE:
         follows = "it goes with the force of the test, as where rebound is unlike compression; no tare does that"
+    elif not any_usual and chance <= OF_FEW:
+        follows = f"{FEW_IN_ORDER}; else a tare that changed"
+    elif not any_usual:
+        return entry
     elif usual and abs(mine + usual) <= ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
     elif chance <= OF_FEW and abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
-        follows = (
-            f"{usual:+.4g} N is usual in this setting; it goes with the speed of the few tests, as where rebound is "
-            "unlike compression; else a tare that changed"
-        )
+        follows = f"{usual:+.4g} N is usual in this setting; {FEW_IN_ORDER}; else a tare that changed"
     elif abs(mine - usual) > ALIKE_OFFSETS * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: a tare that changed; take it out of these files (fixture)"
     else:

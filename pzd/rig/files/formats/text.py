@@ -12,7 +12,7 @@ import re
 from array import array
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, compress, islice
+from itertools import chain, compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -120,8 +120,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         body, uneven, trailing = _without_trailing_separators(lines, len(header))
     if uneven.any():
         if entry.header is None:
-            rows = [row for row, line in enumerate(body.split("\n")) if fields_of(line, lines.separator) == header]
-            _refuse_repeated_header(path, numbers, rows)
+            _refuse_repeated_header(path, numbers, header, _headers_among(body, lines.separator, header))
         raise DataError(_uneven_faults(path, lines, np.flatnonzero(uneven), len(header)))
     units = tuple(heads[-1]) if entry.units_row else None
     if units is not None and len(units) != len(header):
@@ -294,13 +293,33 @@ def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArra
     return "\n".join(rows), uneven, count
 
 
-def _refuse_repeated_header(path: Path, numbers: NDArray[np.int64], rows: Sequence[int]) -> None:
+def _headers_among(body: str, separator: str, header: Sequence[str]) -> list[tuple[int, list[str]]]:
+    """Return the rows that are a header again, each with its cells: half of them name columns, maybe in other units."""
+    names = {name for head in header if any(map(str.isalpha, name := _name_alone(head)))}
+    any_name = re.compile("|".join(map(re.escape, names)) or r"(?!)", re.IGNORECASE)
+    lines = ((row, line) for row, line in enumerate(body.split("\n")) if any_name.search(line))
+    rows = ((row, [cell for cell in fields_of(line, separator) if cell]) for row, line in lines)
+    return [
+        (row, cells) for row, cells in rows if 2 * sum(_name_alone(c) in names for c in cells) >= max(len(cells), 3)
+    ]
+
+
+def _name_alone(head: str) -> str:
+    """Return the name in a header without the unit behind it."""
+    return re.split(r"[\[(_/,]", head)[0].strip().casefold()
+
+
+def _refuse_repeated_header(
+    path: Path, numbers: NDArray[np.int64], header: Sequence[str], again: Sequence[tuple[int, list[str]]]
+) -> None:
     """Refuse a file whose header stands again in some rows: a logger that was started again wrote on."""
-    if rows:
-        more = {1: "", 2: " and once more below"}.get(len(rows), f" and {len(rows) - 1} more times below")
+    if again:
+        more = {1: "", 2: " and once more below"}.get(len(again), f" and {len(again) - 1} more times below")
+        row, cells = again[0]
+        other = "" if cells == [head for head in header if head] else f", as {', '.join(cells)}"
         raise DataError(
-            f"{at(path, int(numbers[rows[0]]))}: the header stands here again{more}: another recording begins; write "
-            "each into a file of its own"
+            f"{at(path, int(numbers[row]))}: the header stands here again{other}{more}: another recording begins; "
+            "write each into a file of its own, cut above this line"
         )
 
 
@@ -370,9 +389,8 @@ class _Table:
         try:
             (frame,) = self._parsed(columns, "float64", self.lines.size)
         except (ValueError, OverflowError):
-            again = [row for row, cell in enumerate(self._cells(columns[0])) if cell == self.header[columns[0]]]
-            if all(next(islice(self._cells(c), row, None)) == self.header[c] for row in again[:1] for c in columns):
-                _refuse_repeated_header(self.path, self.lines, again)
+            again = _headers_among(self.body, self.separator, self.header)
+            _refuse_repeated_header(self.path, self.lines, self.header, again)
             return self._cell_by_cell(columns)
         values = {column: frame[column].to_numpy() for column in columns}
         infinite = {
