@@ -237,7 +237,7 @@ def _gap_change(
         if whole[0] <= OWN_SHARE * sizes[0]:
             return change
         error = f"the error falls from {_percent(whole[0])} to {_percent(whole[1])} of peak"
-        return f"{error}; {change} beside what a zero, gain and delay of each test would make up for"
+        return f"{error}; {change} beside what a zero, gain and delay of each test would explain"
     moved = force_change(selection.final_evidence.whole, selection.baseline, selection.fitted)
     return (
         f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "
