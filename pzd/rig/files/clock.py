@@ -33,8 +33,8 @@ CREEPING = 5e-3
 """where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
 OFTEN = 0.01
 """Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
-FEWEST_TICKS = 3
-"""Times that a clock with too few digits must go on to tell a rate: two whole ticks lie between them."""
+FEWEST_TICKS = 2
+"""Times that a clock with too few digits must go on to tell a rate: a whole tick lies between them."""
 LONGEST_PAUSE = 600.0
 """Pause [s] that no test has, where it is longer than all the rest of the record as well."""
 MOST_LOST = 1_000_000
