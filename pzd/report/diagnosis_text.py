@@ -38,8 +38,8 @@ _MOST = 3
 """How many regions and candidates are listed."""
 _MOST_SHAPES = 2
 """How many shapes of the residual force, each by itself."""
-_LEAST_SHARE = 0.01
-"""Share of the gap from which an effect stands in the headline: in whole percent less is nothing."""
+_LEAST_SHARE = 0.02
+"""Share of the gap from which an effect stands in the headline: of a hundredth rounding makes something or nothing."""
 
 _LEAST_OWN = 0.1
 """Share of the noise floor that the tests' own zero, gain and delay take from which they stand beside the noise: in

@@ -42,8 +42,8 @@ MARGIN = 0.1
 HAIR = 0.05
 """Samples that a cycle may lack of a whole number of them and have it.
 
-Reason: periods are found to a hundred-thousandth. With a point fewer than samples, as 999.99 rounded down has, the points
-pass from sample to sample, and the spline between two smooths white noise by an eighth."""
+Reason: periods are found to a hundred-thousandth. With a point fewer than samples, as 999.99 rounded down has, the
+points pass from sample to sample, and the spline between two smooths white noise by an eighth."""
 
 
 @dataclass(frozen=True)
