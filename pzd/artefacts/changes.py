@@ -72,6 +72,22 @@ class Unchanged(_Keyed):
     at_voltage_V: tuple[float, ...] | None = None
 
 
+def values_at(row: Change | Unchanged, index: int) -> tuple[float | None, ...]:
+    """Return a quantity before and after, and the ends of its interval, at one of its control signals."""
+    return tuple(value_at(values, index) for values in (row.from_, row.to, row.low95, row.high95))
+
+
+def value_at(values: Numbers, index: int) -> float | None:
+    """Return a value at one of the control signals of a quantity."""
+    return values[index] if isinstance(values, tuple) else values
+
+
+def holds_what_was(row: Change | Unchanged, index: int) -> bool | None:
+    """Tell whether the interval of a quantity holds its first value, at one of its control signals; None without."""
+    start, _, low, high = values_at(row, index)
+    return None if start is None or low is None or high is None else low <= start <= high
+
+
 class Changes(_Keyed):
     """What changed between two states of a damper, how sure that is, and what cannot be told apart."""
 

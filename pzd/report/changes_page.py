@@ -6,7 +6,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pzd.artefacts.changes import Change, Changes, Course, CourseRow, Unchanged
+from pzd.artefacts.changes import (
+    Change,
+    Changes,
+    Course,
+    CourseRow,
+    Unchanged,
+    holds_what_was,
+    value_at,
+    values_at,
+)
 from pzd.diagnosis.changes.comparison import Compared, ComparedCycle
 from pzd.diagnosis.changes.over import Followed
 from pzd.quantities import Control
@@ -27,7 +36,7 @@ from pzd.report.blocks import (
     sentence,
     spelled,
 )
-from pzd.report.changes_text import SHARES, TOO_SMALL, holds_what_was, value_at, values_at
+from pzd.report.changes_text import SHARES, TOO_SMALL
 from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render

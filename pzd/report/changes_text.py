@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pzd.artefacts.changes import Change, Changes, Course, Numbers, Unchanged
+    from pzd.artefacts.changes import Change, Changes, Course, Unchanged
     from pzd.quantities import Control
 
 _VERDICTS = {
@@ -42,6 +42,7 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
 
 
 def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
+    from pzd.artefacts.changes import holds_what_was, values_at
     from pzd.report.columns import TERMINAL
 
     name = row.name if row.name == row.parameter else f"{row.name} {row.parameter}"
@@ -58,22 +59,6 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
         else:
             told = f", {TOO_SMALL}" if holds_what_was(row, i) is False else ""
         yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{told}"
-
-
-def values_at(row: Change | Unchanged, index: int) -> tuple[float | None, ...]:
-    """Return a quantity before and after, and the ends of its interval, at one of its control signals."""
-    return tuple(value_at(values, index) for values in (row.from_, row.to, row.low95, row.high95))
-
-
-def value_at(values: Numbers, index: int) -> float | None:
-    """Return a value at one of the control signals of a quantity."""
-    return values[index] if isinstance(values, tuple) else values
-
-
-def holds_what_was(row: Change | Unchanged, index: int) -> bool | None:
-    """Tell whether the interval of a quantity holds its first value, at one of its control signals; None without."""
-    start, _, low, high = values_at(row, index)
-    return None if start is None or low is None or high is None else low <= start <= high
 
 
 def course_lines(found: Course, control: Control) -> Iterator[str]:

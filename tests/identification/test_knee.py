@@ -181,6 +181,15 @@ def test_a_bingham_damper_has_no_knee_and_keeps_its_law(rng: np.random.Generator
     assert identified_damper(here, None).effects == {}
 
 
+def test_a_friction_at_its_limit_of_none_has_an_interval(rng: np.random.Generator) -> None:
+    """Noise leaves it at 1e-14 N, by whose ten-thousandth no force changes: it ended as a fault of pzd."""
+    row = TRUTH.base[0].model_copy(update={"T0_N": 0.0})
+    (knee,) = found(of(TRUTH.model_copy(update={"base": (row,)})), rng).knees.rows
+    assert knee.friction_N < 1.0
+    assert knee.friction_N_low95 == 0.0
+    assert 0.0 < knee.friction_N_high95 < 20.0
+
+
 def test_a_knee_in_one_direction_alone_is_found_in_that_direction_alone(rng: np.random.Generator) -> None:
     values = {**TRUTH.effects["knee"], "F_comp": 1e7, "C_comp": 1400.0}
     (row,) = found(of(TRUTH.with_effect("knee", values)), rng).knees.rows

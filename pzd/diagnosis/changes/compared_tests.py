@@ -27,7 +27,7 @@ from pzd.diagnosis.changes.pairs import (
 from pzd.diagnosis.changes.regression import Likelihood
 from pzd.diagnosis.changes.state import State
 from pzd.identification.config import IdentifyConfig
-from pzd.record import CONSTANT_SHARE, Array
+from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -63,9 +63,7 @@ def comparisons_of(
             f"{after.name}: no test repeats its motion at a constant control signal, so there is no cycle to compare; "
             "run a sine or triangle for three cycles or more"
         )
-    within = identify.group.voltage_V
-    if within is None:
-        within = CONSTANT_SHARE * max(before.voltage_scale, after.voltage_scale)
+    within = max(state.voltage_slack(identify.group.voltage_V) for state in (before, after))
     pairs = paired(one, other, within, identify.group.temperature_degC)
     matched = {j for _, j in pairs}
     found = [cycles_compared(before.damper, one[i], other[j]) for i, j in pairs]

@@ -9,7 +9,7 @@ from typing import Literal, cast
 import numpy as np
 
 from pzd.artefacts import NextTest
-from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict
+from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict, holds_what_was
 from pzd.damper.effects.accumulator import POLYTROPIC
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
@@ -782,10 +782,8 @@ class Findings:
 
 def _holds_what_was(change: Change) -> bool:
     """Whether the interval of a changed quantity holds its value in the first state, at every control signal."""
-    was, low, high = (
-        np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (change.from_, change.low95, change.high95)
-    )
-    return bool(np.all((low <= was) & (was <= high)))  # of what no test shows none is held
+    nodes = range(len(change.at_voltage_V or (None,)))
+    return all(holds_what_was(change, i) is True for i in nodes)  # of what no test shows none is held
 
 
 def _open(changes: Sequence[Change]) -> list[str]:

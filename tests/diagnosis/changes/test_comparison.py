@@ -19,14 +19,19 @@ from states import (
     names_told,
     scaled,
     sine,
+    state_of,
 )
 
+from pzd.artefacts.changes import Change
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.changes.comparison import _open, changes_between
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
+from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
+from pzd.quantities import Control
 from pzd.record import Record
 from pzd.schema.errors import DataError
 
@@ -481,3 +486,29 @@ def test_of_a_law_in_which_one_side_changed_the_other_side_is_as_it_was(rng: np.
     changes = found(before, after, IdentifyConfig(law="knee"))
     assert {(c.name, c.parameter) for c in changes.changes} == {("knee", "F_comp"), ("knee", "C_comp")}
     assert {each.parameter for each in changes.unchanged if each.name == "knee"} == {"beta", "F_reb", "C_reb"}
+
+
+def test_a_gas_that_grew_is_told_with_the_gas_that_was_there(rng: np.random.Generator) -> None:
+    """A constant and a stiffness that come newly beside an accumulator are no gas where there was none."""
+    row = BaseRow(T0_N=60.0, C_Ns_per_m=1500.0, k_N_per_m=8e5)
+    gas = Damper(base=(row,), effects={"accumulator": {"F_g": 150.0, "L": 0.22}})
+    grown = {**gas.effects, "preload_offset": {"F_0": -60.0}, "gas_spring": {"k_g": 360.0}}
+    first, second = (
+        state_of(name, [sine(damper, None, f, x, rng, 0.001, 0.0) for f, x in MOTIONS])
+        for name, damper in (("new", gas), ("aged", gas.model_copy(update={"effects": grown})))
+    )
+    changes = changes_between(replace(first, damper=gas), second, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+    assert set(names(changes)) == {"preload_offset", "gas_spring"}
+    assert "preload_offset and gas_spring add to the gas of new, an accumulator with F_g = 150 N" in changes.reason
+
+
+def test_what_may_be_as_it_was_is_said_to_be_open() -> None:
+    """Of a change all of whose intervals hold the first value, and of no other one."""
+
+    def change(name: str, low: float, parameter: str = "") -> Change:
+        return Change(name=name, parameter=parameter or name, of="damper", unit="N", from_=100.0, to=90.0, low95=low,
+                      high95=105.0 if low < 100.0 else 120.0, share=0.5, reason="")  # fmt: skip
+
+    assert _open([change("C", 80.0), change("T0", 101.0)]) == ["C"]
+    law = [change("second_branch", 80.0, "T0_2"), change("second_branch", 101.0, "k_2")]
+    assert _open(law) == []
