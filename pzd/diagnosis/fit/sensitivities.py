@@ -292,10 +292,10 @@ def linearise(
     """
     residuals, forces, blocks = [], [], []
     for o, columns, sensors, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        # Next to C = 0 under a power law the slopes leave the floating numbers, and the force does not: a step from there
-        # goes by the samples before it. As NaN they would end the search, and the diagnosis, as a fault.
-        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        standardised = o.residual_and_slopes(force, slopes, sensors)
+        # Next to C = 0 under a power law the slopes leave the floating numbers, and the force does not: a step goes by
+        # the samples before it. As NaN they would end the search, and with it the diagnosis.
+        finite = np.where(np.isfinite(slopes), slopes, 0.0)
+        standardised = o.residual_and_slopes(force, finite, sensors)
         residuals.append(standardised[:, 0].copy())
         forces.append(o.at_compared(o.through_sensors(force, sensors)))
         blocks.append((columns, standardised[:, 1:].copy()))
