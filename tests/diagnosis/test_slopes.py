@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.random import Generator
 from synthetic import damper_of
 
+import pzd.diagnosis.fit.sensitivities as sensitivities_module
 from pzd.damper.compose import respond, sensors_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -113,3 +115,26 @@ def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) 
     shown = [shown_force(o, found.damper) for o in asked.observations]
     exact = [o.residual_and_slopes(f, f[:, None])[:, 1] for o, f in zip(asked.observations, shown, strict=True)]
     assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)
+
+
+def test_slopes_beyond_the_floating_numbers_leave_residuals_and_jacobian_finite(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As those next to C = 0 under a power law, from some sample of a test on: the search ended there as a fault."""
+    problem, damper = whole({"shear_thinning": {"n": 0.5}}, rng, moving=True)
+    unknowns, x = problem.unknowns(("shear_thinning",)), problem.start_with(damper)
+    free = np.full(x.size, np.inf)
+    sound = linearise(problem, unknowns, x, (-free, free))
+    computed = sensitivities_module.sensitivities
+
+    def overflowing(*given: Any) -> tuple[Array, Array]:
+        force, slopes = computed(*given)
+        slopes[force.size // 2 :] = np.nan
+        return force, slopes
+
+    monkeypatch.setattr(sensitivities_module, "sensitivities", overflowing)
+    found = linearise(problem, unknowns, x, (-free, free))
+    np.testing.assert_array_equal(found.residuals[0], sound.residuals[0])
+    jacobian = found.jacobian.dense()
+    assert np.all(np.isfinite(jacobian))
+    assert np.any(jacobian != 0.0)
