@@ -168,8 +168,8 @@ class Parameter:
     """Smallest physical value; a fit that goes below has found something that looks alike."""
     natural_to: float = math.inf
     """Largest physical value; a fit that goes beyond has found something that looks alike."""
-    counted: str = ""
-    """For a place along the stroke: the words between its value and the displacement it is counted from."""
+    position: str = ""
+    """Of a position along the stroke: the words between its value and the displacement it is counted from."""
     with_friction: bool = False
     """Whether it changes with the voltage as T0 does: it is fitted per voltage, in proportion to T0."""
 

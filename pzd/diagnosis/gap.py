@@ -314,7 +314,10 @@ def visible_gap(checks: Sequence[ResidualCheck]) -> float:
 
 
 def gap_with_nuisances(checks: Sequence[ResidualCheck]) -> float:
-    """Compute the same with what a zero, gain and delay of each test would explain."""
+    """Compute the r.m.s. error above the noise as a share of each record's peak force, pooled over the samples.
+
+    Unlike `visible_gap` it holds what a zero, gain and delay of each test would explain.
+    """
     squares = [float(np.mean(c.residual[c.wanted] ** 2)) - c.variance for c in checks]
     return _pooled(checks, [square / c.peak**2 for square, c in zip(squares, checks, strict=True)])
 

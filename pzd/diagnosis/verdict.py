@@ -215,7 +215,7 @@ def with_parts_told(decision: Decision, support: Mapping[str, Support]) -> Decis
     return replace(decision, verdict="ambiguous", reason=f"{decision.reason}; but {words}: {why}")
 
 
-OWN_SHARE = 2.0
+MOSTLY_NUISANCES = 2.0
 """Times as large as the gap that the whole error is from which both are told.
 
 Reason: three quarters of it (mean square) are then what a zero, gain and delay of each test make up for. Not tuned."""
@@ -234,7 +234,7 @@ def _gap_change(
     """
     if sizes[0] >= config.negligible:
         change = f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
-        if whole[0] <= OWN_SHARE * sizes[0]:
+        if whole[0] <= MOSTLY_NUISANCES * sizes[0]:
             return change
         error = f"the error falls from {_percent(whole[0])} to {_percent(whole[1])} of peak"
         return f"{error}; {change} beside what a zero, gain and delay of each test would explain"

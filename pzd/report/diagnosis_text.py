@@ -179,7 +179,7 @@ def counted_from(diagnosis: Diagnosis, effect: str, name: str, place: str) -> st
     from pzd.damper.effects import library
 
     found = library().get(effect)
-    words = next((p.counted for p in found.parameters if p.name == name), "") if found else ""
+    words = next((p.position for p in found.parameters if p.name == name), "") if found else ""
     # An end stop stands at both ends: from where it is counted is said also where that is 0.
     return f" {words} x = {place}" if words and (diagnosis.zero_m or effect == "end_stop") else ""
 

@@ -39,7 +39,7 @@ FEWEST_CYCLES = 1.99
 MARGIN = 0.1
 """Distance of the run from the end of the section, as a share of a cycle, where there is so much to spare."""
 
-HAIR = 0.05
+NEARLY_WHOLE = 0.05
 """Samples that a cycle may lack of a whole number of them and have it.
 
 Reason: periods are found to a hundred-thousandth. With a point fewer than samples, as 999.99 rounded down has, the
@@ -87,8 +87,8 @@ class Cycles:
         return [j for j in range(self.count) if np.all(wanted[number == j])]
 
     def points(self, time: Array) -> int:
-        """Return the number of samples in one cycle, rounded down but for a hair: the length of a folded cycle."""
-        return max(int(np.floor(self.period / usual_step(time) + HAIR)), 4)
+        """Return the number of samples in one cycle, rounded down unless nearly whole: the length of a folded cycle."""
+        return max(int(np.floor(self.period / usual_step(time) + NEARLY_WHOLE)), 4)
 
     @found_once
     def fold(self, time: Array, values: Array) -> Array:

@@ -47,7 +47,7 @@ EFFECT = Effect(
             100.0,
             "length of rod that would fill the volume of the gas",
             _SEARCH,
-            counted="counted from",
+            position="counted from",
         ),
     ),
     same_at_every_voltage=True,

@@ -29,7 +29,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop", _K_E_SEARCH),
         Parameter(
-            "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", _X_E_SEARCH, counted="to either side of"
+            "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", _X_E_SEARCH, position="to either side of"
         ),
     ),
     needs_displacement_zero=True,

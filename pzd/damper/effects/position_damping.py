@@ -24,7 +24,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("c_p", "N s/m", 0.0, -1.0e6, 1.0e6, "damping that comes on top in the zone", _C_P_SEARCH),
         Parameter(
-            "x_p", "m", 0.0, -10.0, 10.0, "displacement at the middle of the zone", _X_P_SEARCH, counted="counted from"
+            "x_p", "m", 0.0, -10.0, 10.0, "displacement at the middle of the zone", _X_P_SEARCH, position="counted from"
         ),
         Parameter("b_p", "m", 0.02, 1.0e-4, 10.0, "half width of the zone, where 1/e of it is left", _B_P_SEARCH),
     ),

@@ -208,7 +208,7 @@ class Findings:
         if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
             doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
-            doubtful.update(_open(reported))
+            doubtful.update(_may_be_as_before(reported))
             told = list(dict.fromkeys([*(c.name for c in reported if c.name in doubtful), *told]))
             reported = [change for change in reported if change.name not in doubtful]
         unreached = self._not_reached_before(best)
@@ -670,7 +670,7 @@ class Findings:
                 told.append(f"less than {100.0 * noise_share:.2g} % of peak would not be seen beneath the noise")
         if of_stand:
             told.append(f"of the stand: {', '.join(of_stand)}")
-        if open_ := _open(listed):
+        if open_ := _may_be_as_before(listed):
             told.append(
                 f"the interval of {' and '.join(open_)} holds what was before: by how much these tests do not tell"
             )
@@ -786,7 +786,7 @@ def _holds_what_was(change: Change) -> bool:
     return all(holds_what_was(change, i) is True for i in nodes)  # of what no test shows none is held
 
 
-def _open(changes: Sequence[Change]) -> list[str]:
+def _may_be_as_before(changes: Sequence[Change]) -> list[str]:
     """Return the names of changes of the damper all of whose intervals hold the value in the first state."""
     of_damper = [change for change in changes if change.of == "damper"]
     differ = {change.name for change in of_damper if not _holds_what_was(change)}

@@ -117,7 +117,7 @@ def diagnosed_state(
 
 def acts_at_a_place(name: str) -> bool:
     """Whether an effect acts at a place of the stroke, so that no force and stiffness make up for another zero."""
-    return name in library() and any(parameter.counted for parameter in library()[name].parameters)
+    return name in library() and any(parameter.position for parameter in library()[name].parameters)
 
 
 def about(damper: Damper, zero: float) -> Damper:

@@ -26,7 +26,7 @@ from pzd.artefacts.changes import Change
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.changes.comparison import _open, changes_between
+from pzd.diagnosis.changes.comparison import _may_be_as_before, changes_between
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
@@ -509,6 +509,6 @@ def test_what_may_be_as_it_was_is_said_to_be_open() -> None:
         return Change(name=name, parameter=parameter or name, of="damper", unit="N", from_=100.0, to=90.0, low95=low,
                       high95=105.0 if low < 100.0 else 120.0, share=0.5, reason="")  # fmt: skip
 
-    assert _open([change("C", 80.0), change("T0", 101.0)]) == ["C"]
+    assert _may_be_as_before([change("C", 80.0), change("T0", 101.0)]) == ["C"]
     law = [change("second_branch", 80.0, "T0_2"), change("second_branch", 101.0, "k_2")]
-    assert _open(law) == []
+    assert _may_be_as_before(law) == []
