@@ -314,13 +314,14 @@ class Identified:
         return cls(**rows, characteristics=Characteristics.read(folder, control), knees=Knees.read(folder, control))
 
     def untrusted(self, control: Control) -> tuple[str, ...]:
-        """Return why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined.
+        """Return why the result is not to be trusted (exit 4)."""
+        return tuple(f"{row.words(control, 'rig')}: {row.status}" for row in self.undetermined)
 
-        Where the knee law is adopted no stage uses these rows of Bingham's.
-        """
+    @property
+    def undetermined(self) -> tuple[ParameterRow, ...]:
+        """The rows whose T0 or C is undetermined; where the knee law is adopted no stage uses those of Bingham's."""
         used = [row for row in self.rows if self.knees.law_of(row.setting) == "bingham"]
-        rows = [row for row in used if row.T0_N is None or row.C_Ns_per_m is None]
-        return tuple(f"{row.words(control, 'rig')}: {row.status}" for row in rows)
+        return tuple(row for row in used if row.T0_N is None or row.C_Ns_per_m is None)
 
 
 IDENTIFIED: Files = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,10 +61,10 @@ def swing(frequency: float, amplitude: float) -> Motion:
     return Motion(time, x, v, a)
 
 
-def rig(law: Law, rng: np.random.Generator, noise: float = 0.003) -> Rig:
+def rig(law: Law, rng: np.random.Generator, noise: float = 0.003, tests: Sequence[tuple[float, float]] = TESTS) -> Rig:
     """The tests on a damper, with white noise of a share of peak force."""
     records = []
-    for number, test in enumerate(TESTS):
+    for number, test in enumerate(tests):
         motion = swing(*test)
         force = law(motion)
         force = force + noise * float(np.max(np.abs(force))) * rng.standard_normal(force.size)
@@ -181,6 +181,23 @@ def test_a_bingham_damper_has_no_knee_and_keeps_its_law(rng: np.random.Generator
     assert identified_damper(here, None).effects == {}
 
 
+def progressive(motion: Motion) -> Array:
+    """A monotube damper whose force rises faster than the speed: no law of ours."""
+    flow = 900.0 * np.abs(motion.velocity) ** 1.6 * np.sign(motion.velocity)
+    return np.where(flow > 0.0, flow, 0.6 * flow) + 30.0 * np.tanh(motion.velocity / 0.004) - 170.0
+
+
+@pytest.mark.parametrize(("of_damper", "taken"), [(progressive, "knee"), (of(BINGHAM), "bingham")])
+def test_three_tests_choose_the_knee_law_where_it_describes_them_far_better(
+    of_damper: Law, taken: str, rng: np.random.Generator
+) -> None:
+    """Of three tests kept back in turn the fastest lies far beyond the others, and chance makes nearly everything."""
+    tests = ((1.0, 0.02), (2.0, 0.02), (4.0, 0.02))
+    (law,) = identify(IdentifyConfig(law="auto"), rig(of_damper, rng, tests=tests), 1).knees.laws
+    assert law.tests == 3
+    assert law.law == taken, law.reason
+
+
 def test_a_friction_at_its_limit_of_none_has_an_interval(rng: np.random.Generator) -> None:
     """A force that is less than viscous at rest draws it there, to 1e-14 N: by a step of so little no force moves."""
     row = TRUTH.base[0].model_copy(update={"T0_N": 0.0})
@@ -260,9 +277,9 @@ def predicted(apart: float, count: int, scatter: float = 0.0, unseen: float = 0.
 
 def test_the_knee_is_taken_where_it_predicts_better_beyond_chance_and_not_below() -> None:
     # Six log ratios of ln(1.5) on average, +- s: Student's t of five degrees of freedom asks for 2.65 s / sqrt(5).
-    assert law_row("auto", None, predicted(0.01, 6, 0.0085, unseen=0.0), 1).law == "knee"
-    assert law_row("auto", None, predicted(0.01, 6, 0.0095, unseen=0.0), 1).law == "bingham"
-    assert law_row("auto", None, predicted(-0.01, 6), 1).law == "bingham"
+    assert law_row("auto", None, predicted(0.01, 6, 0.0085, unseen=0.0), [1.0]).law == "knee"
+    assert law_row("auto", None, predicted(0.01, 6, 0.0095, unseen=0.0), [1.0]).law == "bingham"
+    assert law_row("auto", None, predicted(-0.01, 6), [1.0]).law == "bingham"
 
 
 def test_every_test_counts_alike_however_slow() -> None:
@@ -275,22 +292,22 @@ def test_every_test_counts_alike_however_slow() -> None:
         energy = 1.0 if name == "slow" else 1e4
         entries = [tuple(energy * each for each in (error, 1.0, 1.0, 1e-6)) for error in both.values()]
         rows.append((row, entries[0], entries[1]))
-    law = law_row("auto", None, rows, 1)
+    law = law_row("auto", None, rows, [1.0])
     assert law.law == "knee"
     assert "better in 5 of 5" in law.reason
 
 
 def test_an_invisible_improvement_chooses_no_knee_law_however_significant() -> None:
-    law = law_row("auto", None, predicted(0.01, 6, unseen=0.011), 1)
+    law = law_row("auto", None, predicted(0.01, 6, unseen=0.011), [1.0])
     assert law.law == "bingham"
     assert "by less than 0.25% of peak" in law.reason
 
 
 def test_too_few_tests_choose_no_law_and_the_reason_says_so() -> None:
-    law = law_row("auto", None, predicted(0.01, 2), 1)
+    law = law_row("auto", None, predicted(0.01, 2), [1.0])
     assert law.law == "bingham"
     assert "3 are needed" in law.reason
-    assert law_row("knee", None, [], 1).law == "knee"
+    assert law_row("knee", None, [], [1.0]).law == "knee"
 
 
 def knee_row(voltage: float | None = None, zero: float = 0.0, temperature: float | None = None) -> KneeRow:

@@ -42,8 +42,8 @@ class State:
     def of(cls, name: str, rig: Rig, identified: Identified, setting: str | None, control: Control) -> State:
         """Return a state with the damper that identify found."""
         records, _ = data.unsaturated_records(rig, setting)
-        rows = tuple(row for row in identified.rows if row.setting == setting)
-        lacking = [f"{row.words(control, name)}: {row.status}" for row in rows if None in (row.T0_N, row.C_Ns_per_m)]
+        rows = [row for row in identified.undetermined if row.setting == setting]
+        lacking = [f"{row.words(control, name)}: {row.status}" for row in rows]
         damper = identified_damper(identified, setting)
         return cls(name, data.prepare(records), damper, voltage_scale(records), tuple(lacking))
 
