@@ -437,6 +437,35 @@ def test_dampers_of_several_corners_or_numbers_are_settings(tmp_path: Path, name
     assert {entry.voltage_V for entry in entries} == ({150.0} if "V" in names else {None})
 
 
+FOLDERS: dict[str, tuple[list[str | None], list[float | None], list[float | None]]] = {
+    "before/1Hz after/1Hz": (["after", "before"], [None], [None]),
+    "new/csv/1Hz new/csv/2Hz aged/csv/1Hz aged/csv/2Hz": (["aged", "aged", "new", "new"], [None], [None]),
+    "LF/1Hz RF/2Hz": (["LF", "RF"], [None], [None]),
+    "0V/1Hz 5V/1Hz": ([None, None], [0.0, 5.0], [None]),
+    "20degC/1Hz 40degC/1Hz": ([None, None], [None], [20.0, 40.0]),
+    "new/0V/1Hz new/5V/1Hz old/0V/1Hz old/5V/1Hz": (["new", "new", "old", "old"], [0.0, 5.0], [None]),
+    "0V/new/1Hz 0V/old/1Hz 5V/new/1Hz 5V/old/1Hz": (["new", "new", "old", "old"], [0.0, 5.0], [None]),
+    "monday/1Hz tuesday/2Hz": ([None, None], [None], [None]),
+}
+
+
+@pytest.mark.parametrize("paths", FOLDERS)
+def test_folders_with_the_same_tests_are_states_of_a_damper_unless_they_name_a_level(
+    tmp_path: Path, paths: str
+) -> None:
+    """One fit to a damper before and after a rebuild is neither."""
+    settings, voltages, temperatures = FOLDERS[paths]
+    head, columns = ["time_s,displacement_m,force_N"], [numbers(values) for values in (TIME, X)]
+    files = [
+        stored(tmp_path / f"{path}.csv", head, [*columns, numbers((1.0 + 0.01 * i) * FORCE)], ",")
+        for i, path in enumerate(paths.split())  # a copy of a test would be told as such
+    ]
+    entries = read_back(tmp_path, files).entries
+    assert sorted((entry.setting for entry in entries), key=str) == settings
+    assert sorted({entry.voltage_V for entry in entries}, key=str) == voltages
+    assert sorted({entry.temperature_degC for entry in entries}, key=str) == temperatures
+
+
 def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, X, FORCE)]
     for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a"), ("LF-a", "LF-b")):

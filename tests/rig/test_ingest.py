@@ -165,13 +165,16 @@ def test_clock_times_are_read_by_their_format(tmp_path: Path) -> None:
     assert "no date and time like" in refused(tmp_path, entry | {"units": {"time": "%d.%m.%Y"}})[0]
 
 
-def test_names_take_the_parent_folder_only_where_stems_are_equal(tmp_path: Path) -> None:
+def test_names_take_as_many_folders_as_tell_equal_stems_apart(tmp_path: Path) -> None:
     for name in ("one/run.csv", "two/run.csv", "two/other run.csv"):
         write(tmp_path / name, lines(CANONICAL))
     rig = run(tmp_path, {"path": "**/*.csv"})
     assert [record.name for record in rig.records] == ["one-run", "other_run", "two-run"]
     write(tmp_path / "deep" / "one" / "run.csv", lines(CANONICAL))
-    assert "two records would be called one-run" in wrong(tmp_path, {"path": "**/*.csv"})[0]
+    names = {record.name for record in run(tmp_path, {"path": "**/*.csv"}).records}
+    assert names == {"deep-one-run", f"{tmp_path.name}-one-run", f"{tmp_path.name}-two-run", "other_run"}
+    write(tmp_path / "deep-one-run.csv", lines(CANONICAL))
+    assert "two records would be called deep-one-run" in wrong(tmp_path, {"path": "**/*.csv"})[0]
 
 
 def test_a_known_fixture_is_taken_out_and_reported(tmp_path: Path) -> None:

@@ -182,28 +182,30 @@ class SniffedFile:
         )
 
 
-def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path], among: Sequence[str]) -> Iterator[GuessedEntry]:
-    """Make the entries of files that a layout fits; `among` are the names of all files."""
+def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path], among: Sequence[Path]) -> Iterator[GuessedEntry]:
+    """Make the entries of files that a layout fits; `among` are all files."""
     quantities = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
     quantities |= set(layout.split.constants) if layout.split else set()
     controlled = not quantities.isdisjoint((VOLTAGE.name, layout.control.signal().name))
     for path, members, setting, in_names in _by_setting(paths, among):
         lines = [f"    - path: {written(path)}", f"      layout: {name}    # {layout.about}"]
         pattern = layout.pattern or in_names
-        lines += [f"      {_setting_key(setting)}"] if setting and pattern is None else []
+        lines += [f"      {setting.key}"] if setting and pattern is None else []
         if pattern != layout.pattern:
             lines.append(f"      {_pattern_key(pattern)}")
-        settings = tuple(setting or setting_of(pattern, file) for file in members)
+        settings = tuple(setting.name if setting else setting_of(pattern, file) for file in members)
         yield GuessedEntry(tuple(lines), controlled, settings)
 
 
-def by_headers(found: Sequence[SniffedFile], control: Control, among: Sequence[str]) -> Iterator[GuessedEntry]:
-    """Make the entries of files from their headers; `among` are the names of all files."""
+def by_headers(found: Sequence[SniffedFile], control: Control, among: Sequence[Path]) -> Iterator[GuessedEntry]:
+    """Make the entries of files from their headers; `among` are all files."""
     groups: dict[tuple[object, ...], list[SniffedFile]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
-        levels = _levels_of_folders([file.path for file in group], control)
+        levels = {
+            name: _levels_of_folders([file.path for file in group], name) for name in (control.name, TEMPERATURE.name)
+        }
         above = [text for file in group for text in file.above]
         for path, members, setting, in_names in _by_setting([file.path for file in group], among):
             mine = [file for file in group if file.path in members]
@@ -215,25 +217,30 @@ def by_headers(found: Sequence[SniffedFile], control: Control, among: Sequence[s
             lines = [f"    - path: {written(path)}"]
             lines += [f"      {line}" for line in (_ranges(mine[0]) if mine[0].dialect.headless else ())]
             lines += [f"      {line}" for line in _keys(mine, control, columns, pattern, units | said)]
-            lines += [f"      {_setting_key(setting)}"] if setting else []
+            lines += [f"      {setting.key}"] if setting else []
             if preamble:
                 lines.append(f"      preamble: {written(preamble)}    # in the lines above the header")
             asked = doubt_in_names([file.path.stem for file in mine]) is not None
             controlled = VOLTAGE in columns or control.name in units | said or asked
-            if not controlled and (level := levels.get(mine[0].path.parent)):
-                lines.append(f"      constants: {{{control.name}: {level}}}    # from the folder's name")
-                controlled = True
-            settings = tuple(setting or setting_of(pattern, file.path) for file in mine)
+            unsaid = [] if controlled else [control.name]
+            unsaid += [] if TEMPERATURE in columns or TEMPERATURE.name in units | said else [TEMPERATURE.name]
+            of_folder = {name: level for name in unsaid if (level := levels[name].get(mine[0].path.parent))}
+            if of_folder:
+                constants = ", ".join(f"{name}: {level}" for name, level in of_folder.items())
+                lines.append(f"      constants: {{{constants}}}    # from the folder's name")
+                controlled = controlled or control.name in of_folder
+            settings = tuple(setting.name if setting else setting_of(pattern, file.path) for file in mine)
             yield GuessedEntry(tuple(lines), controlled, settings)
 
 
-def _levels_of_folders(paths: Sequence[Path], control: Control) -> dict[Path, str]:
-    """Return by folder the control signal in its name; nothing with one folder, or where a name has none."""
+def _levels_of_folders(paths: Sequence[Path], name: str) -> dict[Path, str]:
+    """Return by folder the value of a quantity in its name; nothing with one folder, or where a name has none."""
     folders = sorted({path.parent for path in paths})
-    found = value_in_names([folder.name for folder in folders], control.name) if len(folders) > 1 else None
+    names = _names_of_folders(folders)
+    found = value_in_names(names, name) if len(folders) > 1 else None
     if found is None or found[1] is None:
         return {}
-    values = ((folder, re.search(found[0], folder.name)) for folder in folders)
+    values = ((folder, re.search(found[0], text)) for folder, text in zip(folders, names, strict=True))
     return {folder: f"{number_in_name(match[1])} {found[1]}".strip() for folder, match in values if match}
 
 
@@ -432,19 +439,61 @@ def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
     return found
 
 
+@dataclass(frozen=True)
+class _Setting:
+    """The setting of some files, and what names it."""
+
+    name: str
+    whence: str
+
+    @property
+    def key(self) -> str:
+        """Return it as a line of the config."""
+        return f"setting: {written(self.name)}    # from {self.whence}"
+
+
 def _by_setting(
-    paths: Sequence[Path], among: Sequence[str]
-) -> Iterator[tuple[str, Sequence[Path], str | None, str | None]]:
+    paths: Sequence[Path], among: Sequence[Path]
+) -> Iterator[tuple[str, Sequence[Path], _Setting | None, str | None]]:
     """Yield a path pattern, its files, and their setting or else the pattern that finds it in their names."""
-    apart: Sequence[str | None] = settings_apart([path.stem for path in paths], among) or [None] * len(paths)
+    names = [path.stem for path in among]
+    apart: Sequence[str | None] = settings_apart([path.stem for path in paths], names) or [None] * len(paths)
+    of_folders = _settings_of_folders(among)
     for setting in dict.fromkeys(apart):
         mine = [path for path, its in zip(paths, apart, strict=True) if its == setting]
         for path, members in _patterns(mine):
-            yield path, members, setting, None if setting else setting_in_names([m.stem for m in members], among)
+            pattern = None if setting else setting_in_names([m.stem for m in members], names)
+            told = _Setting(setting, "the files' names") if setting else None
+            if told is None and pattern is None and (folder := of_folders.get(members[0].parent)):
+                told = _Setting(folder, "the folder's name: remove it where all are one damper in one state")
+            yield path, members, told, pattern
 
 
-def _setting_key(setting: str) -> str:
-    return f"setting: {written(setting)}    # from the files' names"
+def _settings_of_folders(among: Sequence[Path]) -> dict[Path, str]:
+    """Return by folder its name, where folders name a damper each, or hold tests of the same names: before and after.
+
+    A control signal or temperature in the name is no part of it, and all of it in names that tell nothing else.
+    """
+    folders = sorted({path.parent for path in among})
+    names = _names_of_folders(folders)
+    for quantity in (*(control.name for control in CONTROLS), TEMPERATURE.name):
+        if found := value_in_names(names, quantity):
+            names = [re.sub(found[0], "", name).strip(" _-") for name in names]
+    settings = set(names)
+    if len(settings) < 2 or (names != _names_of_folders(folders) and len(settings) == len(folders)):
+        return {}
+    of = dict(zip(folders, names, strict=True))
+    tests = {setting: {path.stem for path in among if of[path.parent] == setting} for setting in settings}
+    again = all(any(mine & tests[other] for other in settings - {setting}) for setting, mine in tests.items())
+    return of if again or setting_in_names(names, names) else {}
+
+
+def _names_of_folders(folders: Sequence[Path]) -> list[str]:
+    """Return the parts of the paths in which folders differ: of new/csv and aged/csv the first."""
+    paths, longest = [folder.parts for folder in folders], max(len(folder.parts) for folder in folders)
+    differ = [i for i in range(longest) if len({path[i : i + 1] for path in paths}) > 1]
+    told = (" ".join(path[i] for i in differ if i < len(path)) for path in paths)
+    return [name or folder.name for name, folder in zip(told, folders, strict=True)]
 
 
 def _pattern_key(pattern: str | None) -> str:
@@ -627,10 +676,9 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
     fitting, found = _by_fit(files, layout)
-    among = [path.stem for path in files]
     control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
-    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths, among)]
-    entries += by_headers(found, control, among)
+    entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths, files)]
+    entries += by_headers(found, control, files)
     lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if fitting:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
@@ -708,7 +756,7 @@ def _in_names(control: Control, files: Sequence[SniffedFile]) -> bool:
     stems = [path.stem for path in paths]
     doubt = doubt_in_names(stems)
     named = value_in_names(stems, control.name) is not None or (doubt is not None and doubt[0] == control.name)
-    return named or bool(_levels_of_folders(paths, control))
+    return named or bool(_levels_of_folders(paths, control.name))
 
 
 def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:

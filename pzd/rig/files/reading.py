@@ -6,7 +6,6 @@ listing -> layout -> format reader -> channels -> tests -> refusals -> clock -> 
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -200,21 +199,22 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
 
     Returns
     -------
-    the file's stem; with the parent folder in front where stems are equal; then -1, -2
+    the file's stem; where stems are equal with as many folders in front as tell them apart; then -1, -2
 
     Raises
     ------
     ConfigError : when two records would have one name
     """
     files = list(dict.fromkeys(path for path, _ in tests))
-    stems = Counter(safe_name(path.stem) for path in files)
+    by_stem: dict[str, list[Path]] = {}
+    for path in files:
+        by_stem.setdefault(safe_name(path.stem), []).append(path)
+    of_files = {path: name for same in by_stem.values() for path, name in zip(same, _apart(same), strict=True)}
     called: list[str] = []
     first: dict[str, Path] = {}
     faults: list[str] = []
     for path, number in tests:
-        stem = safe_name(path.stem)
-        file = stem if stems[stem] == 1 else safe_name(f"{path.resolve().parent.name}-{path.stem}")
-        name = file if number is None else f"{file}-{number}"
+        name = of_files[path] if number is None else f"{of_files[path]}-{number}"
         called.append(name)
         if name in first:
             faults.append(f"rig.files: two records would be called {name}: {first[name]} and {path}; rename one")
@@ -222,6 +222,16 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
     if faults:
         raise ConfigError(faults)
     return tuple(called)
+
+
+def _apart(paths: Sequence[Path]) -> list[str]:
+    """Return names of files of one stem, with the fewest folders in front that tell them apart."""
+    found = [safe_name(path.stem) for path in paths]
+    for folders in range(1, max(len(path.resolve().parts) for path in paths)):
+        if len({*found}) == len(paths):
+            break
+        found = [safe_name("-".join((*path.resolve().parts[-1 - folders : -1], path.stem))) for path in paths]
+    return found
 
 
 # --- Rounded time stamps of a regular clock ---
