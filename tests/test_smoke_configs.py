@@ -75,15 +75,21 @@ def named_in(command: str) -> list[Path]:
 def shown_of(config: Path) -> list[tuple[str, str]]:
     """Each command that a page shows with this config, and what the page says it prints, in whole or in part.
 
-    A command on several configs is one of the last of them, and of none where data of another are absent.
+    A command on several configs is one of the last of them to run, and of none where data of another are absent.
     """
     pages = [*ROOT.glob("*.md"), *ROOT.glob("configs/*.md"), *ROOT.glob("pzd/**/*.md")]
     found = [listing for path in sorted(pages) for listing in listings(path.read_text(encoding="utf-8"))]
     return [
         (command, shown)
         for command, shown in found
-        if named_in(command)[-1:] == [config] and not any(absent(other) for other in named_in(command))
+        if max(named_in(command), default=None) == config and not any(map(absent, named_in(command)))
     ]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of every run, so that a command on several configs finds those that have run."""
+    return tmp_path_factory.mktemp("runs")
 
 
 def test_there_are_configs_to_run() -> None:
@@ -91,29 +97,30 @@ def test_there_are_configs_to_run() -> None:
 
 
 @pytest.mark.parametrize("config", CONFIGS, ids=lambda config: config.stem)
-def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command, tmp_path: Path) -> None:
+def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command, runs: Path) -> None:
     if absent(config):
         pytest.skip(f"configs/{config.name}: measured data absent, nothing matches {', '.join(absent(config))}")
-    checked = pzd("check", config, "--runs", tmp_path)
+    there = written(runs)
+    checked = pzd("check", config, "--runs", runs)
     assert checked.returncode == DONE, checked.stdout + checked.stderr
-    assert written(tmp_path) == {}
+    assert written(runs) == there
 
-    first = pzd("run", config, "--runs", tmp_path)
+    first = pzd("run", config, "--runs", runs)
     # What the virtual stand gives must be trusted; of a measured damper it may be a finding that it cannot.
     admitted = {DONE, UNTRUSTED} if measured(config) else {DONE}
     assert first.returncode in admitted, first.stdout + first.stderr
-    folder = tmp_path / config.stem
+    folder = runs / config.stem
     without = OF_A_RIG if "damper" in yaml.safe_load(config.read_text(encoding="utf-8")) else ("none",)
     expected = [pattern for pattern in CONTRACT if not pattern.startswith(without)]
     assert [pattern for pattern in expected if not any(folder.glob(pattern))] == []
 
     before = written(folder)
-    second = pzd("run", config, "--runs", tmp_path)
+    second = pzd("run", config, "--runs", runs)
     assert second.returncode == first.returncode, second.stdout + second.stderr
     assert written(folder) == before
 
     for command, shown in shown_of(config):
-        told = pzd(*shlex.split(command)[1:], "--runs", tmp_path)
+        told = pzd(*shlex.split(command)[1:], "--runs", runs)
         as_first = {first.returncode} if named_in(command) == [config] else admitted
         assert told.returncode in as_first, told.stdout + told.stderr
         assert missing(shown, told.stdout, BETWEEN_PROCESSORS) == []
