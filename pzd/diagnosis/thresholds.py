@@ -123,6 +123,12 @@ END_STOP_BEGINS_BY = 0.95
 
 Reason: on the last twentieth alone every law of a reversal acts, such as the rise of a friction at rest: a stop stood
 in for that, and "moved" with the amplitude of the test. Not tuned."""
+LONE_END_STOP_BEGINS_BY = 0.9
+"""The same where one motion alone reaches the stop.
+
+Reason: a friction that gives by a twentieth of the stroke before it slips was named so (a rig of other authorship)."""
+OTHER_MOTION = 0.05
+"""Difference of amplitude or peak speed from which two motions are not one: far above how well a stand repeats one."""
 HALVES_SIGNIFICANCE = 0.001
 """Probability by chance below which halves of the tests disagree about a parameter.
 

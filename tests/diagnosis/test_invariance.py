@@ -266,7 +266,27 @@ def test_a_stop_at_one_end_of_an_absolute_displacement_is_found_where_it_is(rng:
 )
 def test_an_end_stop_acts_near_an_end_of_a_recorded_stroke_of_60_mm(x_e: float, zero: float, why: str | None) -> None:
     damper = damper_of((0.0,), end_stop={"k_e": 1e6, "x_e": x_e}).moved(zero)
-    found = misplaced_end_stop(damper, 0.03)
+    motions = [(np.array([-0.03, 0.03]), np.array([0.0, speed])) for speed in (0.1, 0.2)]
+    found = misplaced_end_stop(damper, 0.03, motions)
+    assert found is None if why is None else found is not None and why in found
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "speeds", "why"),
+    [
+        ((0.03, 0.02), (0.2, 0.2), "turn round"),  # one of them reaches the stop
+        ((0.03, 0.03), (0.2, 0.2), "turn round"),  # one motion at two voltages
+        ((0.03, 0.03), (0.2, 0.1), None),
+        ((0.03, 0.028), (0.2, 0.2), None),
+    ],
+)
+def test_a_stop_in_the_last_tenth_of_the_stroke_is_shown_by_two_motions(
+    amplitudes: tuple[float, ...], speeds: tuple[float, ...], why: str | None
+) -> None:
+    """Friction that gives before it slips, at the reversal of the longest test, was named an end stop."""
+    damper = damper_of((0.0,), end_stop={"k_e": 1e6, "x_e": 0.0277})
+    motions = [(np.array([-a, a]), np.array([0.0, v])) for a, v in zip(amplitudes, speeds, strict=True)]
+    found = misplaced_end_stop(damper, 0.03, motions)
     assert found is None if why is None else found is not None and why in found
 
 

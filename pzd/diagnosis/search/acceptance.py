@@ -53,28 +53,46 @@ def insufficient_support(evidence: Evidence, config: DiagnoseConfig, candidate: 
         return "does not pay"
     if candidate.explained < config.visible:
         return f"moves the force by less than {100 * config.visible:g} % of peak"
-    scales = evidence.whole.scales
-    return trivial(candidate.fitted, candidate.effect, scales.low_force) or _misplaced(candidate, scales.stroke)
+    return trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force) or _misplaced(
+        candidate, evidence.whole
+    )
 
 
-def _misplaced(candidate: Candidate, stroke: float) -> str | None:
-    """Say why the values of a candidate are those of no such effect; `stroke` is half of the whole one [m]."""
+def _misplaced(candidate: Candidate, problem: Problem) -> str | None:
+    """Say why the values of a candidate are those of no such effect."""
     if candidate.effect == "relief_valve" and opens_below_friction(candidate.fitted.damper):
         return ANOTHER_DAMPING
     if candidate.effect in at_limits(candidate.fitted):
         return AT_LIMIT
-    return misplaced_end_stop(candidate.fitted.damper, stroke) if candidate.effect == "end_stop" else None
+    if candidate.effect != "end_stop":
+        return None
+    motions = [(o.motion.displacement, o.motion.velocity) for o in problem.observations]
+    return misplaced_end_stop(candidate.fitted.damper, problem.scales.stroke, motions)
 
 
-def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
+def misplaced_end_stop(damper: Damper, stroke: float, motions: Sequence[tuple[Array, Array]]) -> str | None:
     """Say why an end stop is none by where it begins; None where that is towards an end of the half stroke [m].
 
-    At one end alone it is one: a bump stop, or a stroke that is off the middle.
+    At one end alone it is one: a bump stop, or a stroke that is off the middle. What one motion alone shows near its
+    reversal, any law of a reversal may be: another amplitude or frequency has to reach the stop as well.
+
+    Parameters
+    ----------
+    damper : with the stop
+    stroke : half of the whole one [m]
+    motions : (n,) displacement [m] and speed [m/s] of each test
     """
-    begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
-    if float(np.min(begins)) - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
+    begins = float(np.min(damper.effects["end_stop"]["x_e"]))
+    if begins - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
-    if float(np.min(begins)) - abs(damper.zero_m) > thresholds.END_STOP_BEGINS_BY * stroke:
+    reaches = np.array([float(np.max(np.abs(x - damper.zero_m))) for x, _ in motions])
+    fastest = np.array([float(np.max(np.abs(v))) for _, v in motions])
+    there = reaches > begins
+    told = any(
+        np.ptp(of[there]) > thresholds.OTHER_MOTION * of[there].max() for of in (reaches, fastest) if there.any()
+    )
+    by = thresholds.END_STOP_BEGINS_BY if told else thresholds.LONE_END_STOP_BEGINS_BY
+    if begins - abs(damper.zero_m) > by * stroke:
         return "stand-in: begins where the tests turn round, as everything at a reversal does"
     return None
 
