@@ -21,10 +21,18 @@ from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import refit
+from pzd.diagnosis.gap import gap_with_nuisances
 from pzd.diagnosis.predictive_search import CriterionFit, PredictiveSearch, effect_names, improves
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.determination import first_undetermined
-from pzd.fit.cross_validation import STANDARD_ERRORS, PredictionError, log_ratios, paired_t
+from pzd.fit.cross_validation import (
+    STANDARD_ERRORS,
+    PredictionError,
+    log_ratios,
+    paired_t,
+    predicts_better,
+    predicts_worse,
+)
 from pzd.fit.intervals import LEVEL
 
 WORSENS_PREDICTION = "the damper predicts kept-back tests worse with it"
@@ -289,6 +297,37 @@ def plain_unless_better(adoption: Adoption, validation: CrossValidation, forced:
         return adoption
     kept = _plain(selection, {**selection.reasons, **dict.fromkeys(selection.adopted, NO_BETTER)})
     return Adoption(kept, plain, plain, validation.baseline_interpolation_error)
+
+
+def by_criterion_if_better(adoption: Adoption, validation: CrossValidation, forced: Sequence[str]) -> Adoption:
+    """Return the adopted damper fitted by criterion (4), where kept-back tests are predicted better with that.
+
+    Where a law is all but that of the damper, the likelihood leaves in part to the zero, gain and delay of each test
+    what every test shows alike. It forgives them there, and the next test has to be predicted without. The verdict,
+    which asks what is missing, stays that of the likelihood.
+
+    Parameters
+    ----------
+    adoption : the damper, fitted by the likelihood
+    validation : cross-validation of the tests
+    forced : effects that the config asks for, whatever they do
+    """
+    selection = adoption.selection
+    if not selection.adopted or adoption.by_criterion:
+        return adoption
+    damper, checks = selection.fitted.damper, selection.final_evidence.campaign.checks(selection.fitted.damper)
+    found = None
+    if gap_with_nuisances(checks) >= validation.visible:
+        found = validation.fit_by_criterion(damper, validation.no_samples)
+    if found is None or first_undetermined(*found, forced) or set(against_nature(found[1].damper)) - {*forced}:
+        return adoption
+    error = validation.error_by_criterion(damper)
+    between = validation.interpolation_error(damper, by_criterion=True)
+    if not predicts_better(error, adoption.error) or predicts_worse(between, adoption.interpolation_error):
+        return adoption
+    evidence = replace(selection.final_evidence, whole=found[0])
+    fitted = replace(selection, fitted=found[1], final_evidence=evidence)
+    return replace(adoption, selection=fitted, error=error, interpolation_error=between, by_criterion=True)
 
 
 def _predicts(one: PredictionError, plain: PredictionError, validation: CrossValidation) -> bool:

@@ -373,7 +373,7 @@ def regions(checks: Sequence[ResidualCheck], unit: str, displacement_zero: float
     for parts in labels.values():
         if len(parts) == len(checks):  # an axis that some test lacks, such as temperature, divides no whole gap
             found += _denser(np.concatenate(parts), density, weight)
-    found += _frequencies(checks)
+    found += _frequencies(checks, float(density.sum()))
     found += _thirds(checks)
     found.sort(key=lambda item: -item[0])
     return tuple(region for _, region in found[:MOST_REGIONS]) or (Region(region="everywhere alike", share_of_gap=1.0),)
@@ -463,8 +463,14 @@ def _described(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, 
     ]
 
 
-def _frequencies(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
-    """Return the octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
+def _frequencies(checks: Sequence[ResidualCheck], whole: float) -> list[tuple[float, Region]]:
+    """Return the octaves of frequency that hold most of the gap; an offset is one of its own.
+
+    Parameters
+    ----------
+    checks : records against the damper; one without cycles has no octaves, and its share is in none
+    whole : the gap of all records, as their octaves are summed [N^2]
+    """
     power: dict[str, float] = {}
     for check in checks:
         if check.error is None or check.prepared.cycles is None:
@@ -473,8 +479,8 @@ def _frequencies(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
         samples = float(np.count_nonzero(check.wanted))
         for word, part in zip(words, repeatable_power(check.error), strict=True):
             power[word] = power.get(word, 0.0) + samples * float(part)
-    total = sum(power.values())
-    if total <= 0.0 or len(power) < 2:
+    total = max(whole, sum(max(part, 0.0) for part in power.values()))
+    if len(power) < 2:
         return []
     return _described((word, part / total, 1.0 / len(power)) for word, part in power.items())
 

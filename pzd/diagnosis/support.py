@@ -7,7 +7,7 @@ without its fold. All fits are by criterion (4), and the folds are those of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import permutations
 from typing import Literal
 
@@ -22,13 +22,14 @@ from pzd.diagnosis.search.determination import nearly_others
 from pzd.fit.cross_validation import FEWEST_DIFFERENCES, PredictionError, log_ratios, paired_t
 
 
-def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Support]:
+def support_of(adoption: Adoption, validation: CrossValidation, alike: Collection[str] = ()) -> dict[str, Support]:
     """Return the support of every adopted effect.
 
     Parameters
     ----------
     adoption : the adopted damper, and what would do as well in the place of an effect
     validation : cross-validation of the tests
+    alike : effects that are something that looks alike, whatever the tests lose without them
 
     Returns
     -------
@@ -51,7 +52,9 @@ def support_of(adoption: Adoption, validation: CrossValidation) -> dict[str, Sup
     nearly = nearly_others(damper, whole[0].scales.force)
     others = {**adoption.alternatives, **parts(nearly, {n: _share(own, e, before) for n, e in errors.items()})}
     return {
-        name: _support(own, error, before, validation, others.get(name), added=adoption.is_added(name))
+        name: _support(
+            own, error, before, validation, others.get(name), added=adoption.is_added(name), alike=name in alike
+        )
         for name, error in errors.items()
     }
 
@@ -90,6 +93,7 @@ def _support(
     other: str | None,
     *,
     added: bool,
+    alike: bool,
 ) -> Support:
     """Compare the errors of the tests with and without an effect; `other` would do as well in its place.
 
@@ -112,7 +116,7 @@ def _support(
         folds=len(folds),
         replaced_by=other,
         confidence=confidence,
-        sure="open" if added else _sureness(confidence),
+        sure="open" if added or alike else _sureness(confidence),
         added=added,
     )
 

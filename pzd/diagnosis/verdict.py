@@ -48,6 +48,8 @@ class Decision:
     """Effects that may be missing beside those adopted."""
     doubtful: bool = False
     """Whether so much is not excluded that one more test is worth its time."""
+    alike: tuple[str, ...] = ()
+    """Adopted effects that are something that looks alike, by their values."""
 
 
 Conclusion = tuple[Adoption, Decision]
@@ -160,7 +162,8 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     odd = against_nature(selection.fitted.damper)
     if odd and not selection.rivals:
         value = f"a value that no {' and no '.join(odd)} has"
-        return Decision("unexplained", f"{change}; but with {value}, so that it is something that looks alike", None)
+        words = f"{change}; but with {value}, so that it is something that looks alike"
+        return Decision("unexplained", words, None, alike=tuple(odd))
     varying = varying_strengths(selection.final_evidence.whole, selection.fitted, config.significance)
     if varying and not selection.rivals:
         told = " and ".join(
@@ -169,7 +172,7 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
             for name, each in varying.items()
         )
         words = f"{change}; but {told}, so that it is something that looks alike"
-        return Decision("unexplained", words, None)
+        return Decision("unexplained", words, None, alike=tuple(varying))
     better = [m for m in selection.competing_confounders if m.bic_difference < -config.rival_bic]
     if better:
         laws = [
@@ -572,6 +575,10 @@ def no_slip_diagnosis(rows: Sequence[ParameterRow]) -> Diagnosis:
     )
 
 
+NOT_LOOKED_FOR = "no effect was looked for: identify.law: bingham looks for them, beside one T0 and C"
+"""What is said of effects where the knee law alone was asked."""
+
+
 def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseConfig) -> Diagnosed:
     """Adopt the damper with the knee law unchanged: `none` where it misses nothing visible, else `unexplained`.
 
@@ -589,8 +596,8 @@ def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseCo
     law = next(row for row in identified.knees.laws if row.setting == setting)
     diagnosis = Diagnosis.without_effects(
         "unexplained" if missed >= config.visible else "none",
-        f"the knee law of 2-identify/knee.csv is handed on as it was fitted, and {left}; {law.reason}; no effect was "
-        "looked for: identify.law: bingham looks for them, beside one T0 and C",
+        f"the knee law of 2-identify/knee.csv is handed on as it was fitted, and {left}; {law.reason}; "
+        f"{NOT_LOOKED_FOR}",
         gap=None,
     )
     parameters = tuple(map(_knee_parameters, rows))

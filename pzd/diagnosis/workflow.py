@@ -29,7 +29,7 @@ from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import data, next_test, thresholds
-from pzd.diagnosis.adoption import Adoption
+from pzd.diagnosis.adoption import Adoption, by_criterion_if_better
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
@@ -47,6 +47,7 @@ from pzd.diagnosis.search.determination import first_undetermined
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.support import support_of
 from pzd.diagnosis.verdict import (
+    NOT_LOOKED_FOR,
     Conclusion,
     Decision,
     alone_note,
@@ -118,7 +119,8 @@ def diagnose_setting(
     judged = _with_one_alone(judged, baseline, diagnose, control.unit)
     campaign, validation = judged.campaign, judged.validation
     adoption, decision = _concluded(judged, baseline, diagnose, control.unit)
-    support = support_of(adoption, validation)
+    adoption = by_criterion_if_better(adoption, validation, diagnose.force)
+    support = support_of(adoption, validation, decision.alike)
     decision = with_parts_told(decision, support)
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
@@ -169,12 +171,21 @@ def _better_predicting(knee: Diagnosed, other: Diagnosed, law: LawRow) -> Diagno
     """
     found = other.diagnosis.prediction
     if law.W_s_knee is None or found is None or found.hold_out != "tests":
-        return knee
+        return _told_of_effects(knee, "beside one T0 and C effects were looked for, and no kept-back test can tell")
     if found.W_s > thresholds.BETTER_THAN_KNEE * law.W_s_knee:
-        return knee
+        told = (
+            f"beside one T0 and C {' and '.join(other.diagnosis.effects) or 'no effect'} was found, and kept-back tests"
+        )
+        return _told_of_effects(knee, f"{told} are predicted with W_s {found.W_s:.3g}: the knee law stays")
     words = f"the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
     reason = f"{other.diagnosis.reason}; {words}, this damper with {found.W_s:.3g}: it is handed on"
     return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
+
+
+def _told_of_effects(knee: Diagnosed, words: str) -> Diagnosed:
+    """Return the knee law's damper with what became of the search for effects in its reason."""
+    reason = knee.diagnosis.reason.replace(NOT_LOOKED_FOR, words)
+    return replace(knee, diagnosis=knee.diagnosis.model_copy(update={"reason": reason}))
 
 
 def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:

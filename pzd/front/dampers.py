@@ -150,11 +150,16 @@ class Damper(Result):
 
     @in_python
     def force(
-        self, time: Any, displacement: Any, voltage: Any = None, temperature: Any = None, velocity: Any = None
+        self,
+        time: Any,
+        displacement: Any,
+        voltage: Any = None,
+        temperature: Any = None,
+        velocity: Any = None,
+        *,
+        as_recorded: bool = True,
     ) -> Array:
         """Compute the force along a motion, with the oil spring, from a damper that is relaxed at the first sample.
-
-        It is the force as the stand of the tests records it: with `sensor_delay`, where the damper has it.
 
         Parameters
         ----------
@@ -164,6 +169,8 @@ class Damper(Result):
         temperature : a number or (n,) [degC]; by default the lowest at which the damper is known
         velocity : (n,) rate of extension [m/s]; without it the displacement is taken as measured: it is cleaned of its
             noise, where that leaves no step or corner out, and the rate comes of it, as for a record
+        as_recorded : whether it is the force that the stand of the tests would record, with its `sensor_delay` where
+            the damper has that; False for the force at the rod, as a car feels it
 
         Returns
         -------
@@ -173,9 +180,10 @@ class Damper(Result):
         ------
         TypeError, ValueError : when an argument is no such array, time does not increase, or the voltage is missing
         """
-        from pzd.damper.compose import respond
+        from pzd.damper.compose import respond, sensors_of
 
-        return respond(self.model, self.motion(time, displacement, voltage, temperature, velocity))
+        model = self.model if as_recorded else self.model.without_effects(*sensors_of(self.model))
+        return respond(model, self.motion(time, displacement, voltage, temperature, velocity))
 
     def motion(self, time: Any, displacement: Any, voltage: Any, temperature: Any, velocity: Any) -> Motion:
         """Return a motion with control signal and temperature, as `force` takes them."""
@@ -322,7 +330,14 @@ class CurveDamper(Damper):
     @override
     @in_python
     def force(
-        self, time: Any, displacement: Any, voltage: Any = None, temperature: Any = None, velocity: Any = None
+        self,
+        time: Any,
+        displacement: Any,
+        voltage: Any = None,
+        temperature: Any = None,
+        velocity: Any = None,
+        *,
+        as_recorded: bool = True,
     ) -> Array:
         """Compute the force along a motion, which is that of the curve at its velocity; see `Damper.force`."""
         motion = self.motion(time, displacement, None, None, velocity)

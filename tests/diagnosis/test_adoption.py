@@ -9,11 +9,13 @@ from typing import cast
 
 import numpy as np
 import pytest
-from synthetic import TWO, all_but, campaign_of, damper_of, sine, sines
+from synthetic import TWO, all_but, campaign_of, damper_of, diagnosed, sine, sines, waveform
 
+from pzd.damper.compose import respond
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library, nameable
-from pzd.damper.model import Damper, against_nature
+from pzd.damper.model import BaseRow, Damper, against_nature
+from pzd.damper.motion import Motion
 from pzd.diagnosis.adoption import (
     ADDED,
     NO_BETTER,
@@ -33,6 +35,7 @@ from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import Candidate, candidate, candidates, per_voltage_candidates, starts_of
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array, Record
+from pzd.signals.measures import rms
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
 OTHER_TESTS = ((0.5, 0.02), (1.0, 0.03), (2.0, 0.03))
@@ -564,3 +567,23 @@ def test_the_interpolation_check_does_not_depend_on_the_unit_of_the_control_sign
         assert not interpolation_check(
             damper, cross_validation_of(campaign_of(records), Damper(base=tuple(base)), 0.0025)
         )
+
+
+def test_what_every_test_shows_alike_is_handed_on_and_not_left_to_the_zero_of_each(rng: np.random.Generator) -> None:
+    """A gas of exponent 1.38 where the library has 1.3: the gap was 0.03 % of peak, the error of a new motion 2.6 %."""
+
+    def gas(x: Array) -> Array:
+        return -400.0 * (0.08 / (0.08 + x)) ** 1.38
+
+    damper = Damper(base=(BaseRow(T0_N=30.0, C_Ns_per_m=900.0, k_N_per_m=8e5),))
+    records = []
+    for f, a in ((0.5, 0.02), (1.0, 0.03), (2.0, 0.02), (2.0, 0.03), (3.0, 0.02)):
+        made = sine(damper, 0.0, f, a, rng, noise=2e-3, colour=0.0, cycles=6, rate=500.0)
+        records.append(replace(made, name=f"{f}-{a}", force=made.force + gas(made.displacement), voltage=None))
+    found = diagnosed(records, forbid=all_but("accumulator"))
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("named", ("accumulator",)), found.diagnosis.reason
+    time = np.arange(2000) / 500.0
+    x, v, a = (sum(each) for each in zip(*(waveform(time, f, X) for f, X in ((1.3, 0.015), (0.4, 0.01))), strict=True))
+    motion = Motion(time, x, v, a)
+    truth = respond(damper, motion) + gas(x)
+    assert rms(respond(found.damper, motion) - truth) < 0.004 * rms(truth)

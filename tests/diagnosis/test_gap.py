@@ -24,6 +24,7 @@ from pzd.diagnosis.gap import (
     gap_in_force,
     gap_with_nuisances,
     held_out_criterion,
+    regions,
     visible_gap,
 )
 from pzd.diagnosis.search.acceptance import leaves_gap
@@ -87,6 +88,16 @@ def checked(
 def rigid(friction: float, **effects: dict[str, float]) -> Damper:
     row = BaseRow(voltage_V=0.0, T0_N=friction, C_Ns_per_m=2500.0, k_N_per_m=1e8)
     return Damper(base=(row,), effects=dict(effects))
+
+
+def test_octaves_hold_no_more_of_the_gap_than_the_tests_that_have_cycles(rng: np.random.Generator) -> None:
+    """Their noise was divided among octaves as if it were the gap, which lay in a motion that never repeats."""
+    plain, turbulent = rigid(300.0), rigid(300.0, orifice_quadratic={"q": 5000.0})
+    within, outside = checked(plain, plain, rng, 500.0, 8.0), checked(turbulent, plain, rng, 500.0, 1.9)
+    assert within.prepared.cycles is not None
+    assert outside.prepared.cycles is None
+    octaves = [each.share_of_gap for each in regions([within, outside], "V") if each.region.endswith("Hz in the force")]
+    assert sum(octaves) < 0.1
 
 
 @pytest.mark.parametrize("rate", [200.0, 1000.0])

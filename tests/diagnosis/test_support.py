@@ -51,6 +51,13 @@ def test_an_effect_that_is_not_there_is_open(validation: CrossValidation) -> Non
     assert found["gas_spring"].sure == "certain"
 
 
+def test_what_looks_alike_by_its_values_is_open_however_much_is_lost_without_it(validation: CrossValidation) -> None:
+    """`certain` stood in the headline of an effect of which the reason said that it is something else."""
+    found = support_of(adoption_of(validation, **TRUE), validation, alike=("gas_spring",))
+    assert found["gas_spring"].sure == "open"
+    assert found["preload_offset"].sure == "certain"
+
+
 def test_what_another_could_replace_is_half_as_sure(validation: CrossValidation) -> None:
     adoption = adoption_of(validation, **TRUE)
     shared = Adoption(**{**vars(adoption), "alternatives": {"gas_spring": "accumulator"}})

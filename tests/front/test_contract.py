@@ -350,6 +350,16 @@ def test_a_step_and_a_corner_of_a_displacement_are_no_noise(rate: float) -> None
     assert np.max(np.abs(force[time > 1.0])) == pytest.approx(300.0 + 1500.0 * 0.08, rel=0.02)
 
 
+def test_the_force_is_that_of_the_stand_or_without_the_delay_of_its_sensors() -> None:
+    """A car has no load cell that is late."""
+    row, time = {"T0_N": 300.0, "C_Ns_per_m": 1500.0, "k_N_per_m": 2e5}, np.arange(2000) / 500.0
+    x = 0.01 * np.sin(2.0 * np.pi * time)
+    late = pzd.Damper(row, effects={"sensor_delay": {"tau": 0.01}})
+    recorded, at_the_rod = late.force(time, x), late.force(time, x, as_recorded=False)
+    np.testing.assert_allclose(at_the_rod, pzd.Damper(row).force(time, x), rtol=1e-9)
+    np.testing.assert_allclose(recorded[505:], at_the_rod[500:-5], atol=1.0)
+
+
 def test_a_voltage_may_be_a_number_or_move_and_must_be_given_where_it_matters(hidden: pzd.Damper) -> None:
     time = np.arange(1000) / 500.0
     x = 0.01 * np.sin(2.0 * np.pi * time)
