@@ -41,7 +41,9 @@ def support_of(adoption: Adoption, validation: CrossValidation, alike: Collectio
     if whole is None or plain is None:
         return {}
     own, before = validation.error_to_first_order(*whole), validation.error_to_first_order(*plain)
-    fitted = whole[1].damper
+    fitted, total = whole[1].damper, float(before.error.sum())
+    if total > FIRST_ORDER * (refitted := float(adoption.baseline_error.error.sum())) > 0.0:
+        total = refitted
 
     def without(name: str) -> PredictionError | None:
         fewer = validation.fit_by_criterion(fitted.without_effects(name), validation.no_samples)
@@ -50,10 +52,10 @@ def support_of(adoption: Adoption, validation: CrossValidation, alike: Collectio
     tried = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
     errors = {name: error for name, error in tried if error is not None}
     nearly = nearly_others(damper, whole[0].scales.force)
-    others = {**adoption.alternatives, **parts(nearly, {n: _share(own, e, before) for n, e in errors.items()})}
+    others = {**adoption.alternatives, **parts(nearly, {n: _share(own, e, total) for n, e in errors.items()})}
     return {
         name: _support(
-            own, error, before, validation, others.get(name), added=adoption.is_added(name), alike=name in alike
+            own, error, total, validation, others.get(name), added=adoption.is_added(name), alike=name in alike
         )
         for name, error in errors.items()
     }
@@ -79,16 +81,20 @@ def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, s
     return found
 
 
-def _share(own: PredictionError, without: PredictionError, plain: PredictionError) -> float:
-    """Compute the share of the baseline's sum of squared errors that comes back without an effect."""
-    total = float(plain.error.sum())
+FIRST_ORDER = 2.0
+"""Times the error of refits above which that to first order is none: where a plain damper misses more than half of the
+force, a fold without its most telling test is far from linear."""
+
+
+def _share(own: PredictionError, without: PredictionError, total: float) -> float:
+    """Compute the share of the baseline's sum of squared errors [N^2] that comes back without an effect."""
     return min(max(float((without.error - own.error).sum()) / total, 0.0), 1.0) if total > 0.0 else 0.0
 
 
 def _support(
     own: PredictionError,
     without: PredictionError,
-    plain: PredictionError,
+    total: float,
     validation: CrossValidation,
     other: str | None,
     *,
@@ -111,7 +117,7 @@ def _support(
         chance = float(stdtr(len(held) - 1, errors))
         confidence = round(chance / 2.0 if other else chance, 3)
     return Support(
-        share=_share(own, without, plain),
+        share=_share(own, without, total),
         folds_better=better,
         folds=len(folds),
         replaced_by=other,
