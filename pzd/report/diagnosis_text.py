@@ -41,6 +41,8 @@ _MOST_SHAPES = 2
 _LEAST_SHARE = 0.02
 """Share of the gap from which an effect stands in the headline: of a hundredth rounding makes something or nothing."""
 
+_NOT_ITS_NAME = "the whole is closed, but not by what its name says"
+"""What is left of a gap that is closed where some effect is something that looks alike."""
 _LEAST_OWN = 0.1
 """Share of the noise floor that the tests' own zero, gain and delay take from which they stand beside the noise: in
 r.m.s., as the headline has it, less is a twentieth."""
@@ -74,7 +76,10 @@ def diagnosis_lines(
     if diagnosis.prediction:
         lines += _prediction(diagnosis.prediction, unit, every_test=every_test)
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
-    lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
+    lines += [
+        f"adopted: {name}, {_parameters(diagnosis, name, unit)}{_known_of(diagnosis, name)}"
+        for name in diagnosis.effects
+    ]
     if diagnosis.effects and diagnosis.verdict == "unexplained":
         lines.append(f"intervals: these {UNNAMED_FORCE}")
     if diagnosis.confidence is not None:
@@ -89,6 +94,8 @@ def diagnosis_lines(
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in words: what is known of the parts first where the whole is unexplained."""
+    from pzd.signals.measures import VISIBLE  # here, since `pzd --help` needs no numpy
+
     supported = [
         (name.replace("_", " "), each, f"({each.share:.0%} of the gap comes back without it)")
         for name, each in sorted(diagnosis.support.items(), key=lambda item: -item[1].share)
@@ -105,7 +112,18 @@ def headline(diagnosis: Diagnosis) -> str:
     predict = "predicts, whatever it stands for" if len(useful) == 1 else "predict, whatever they stand for"
     words = [known] if known else []
     words += [f"{' and '.join(useful)} {predict}"] if useful else []
-    return f"but {'; '.join(words)}; {100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
+    left = f"{100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
+    return f"but {'; '.join(words)}; {left if diagnosis.left_of_peak >= VISIBLE else _NOT_ITS_NAME}"
+
+
+def _known_of(diagnosis: Diagnosis, effect: str) -> str:
+    """Return how sure an adopted effect is where the whole is unexplained, as words behind it."""
+    if diagnosis.verdict != "unexplained" or effect not in diagnosis.support:
+        return ""
+    support = diagnosis.support[effect]
+    if support.added:
+        return "; for the prediction, whatever it stands for"
+    return "; what it stands for is open" if support.sure == "open" else f"; {support.sure}"
 
 
 def _confident(confidence: float | None) -> bool:
