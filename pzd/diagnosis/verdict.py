@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -653,6 +654,25 @@ def knee_note(law: str, verdict: str, base: Sequence[BaseRow]) -> str:
     if law != "bingham" or verdict != "unexplained" or not passive:
         return ""
     return "; a passive damper has bleed, knee and blow-off: identify: {law: auto} tries that law"
+
+
+def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], signal: str) -> str:
+    """Say that T0 and C are straight lines between few control signals, where some test moves between these.
+
+    Parameters
+    ----------
+    prepared : the tests
+    base : rows of the damper
+    signal : name of the control signal
+    """
+    levels = sorted({row.voltage_V for row in base if row.voltage_V is not None})
+    if all(each.constant for each in prepared) or len(levels) < 2:
+        return ""
+    finer = sorted({*levels, *(0.5 * (low + high) for low, high in pairwise(levels))})
+    return (
+        f"; between {len(levels)} levels T0, C and k are straight lines over the {signal}: "
+        f"identify: {{nodes: [{', '.join(f'{each:.4g}' for each in finer)}]}} tells whether they bend there"
+    )
 
 
 MUCH_BY_TEMPERATURE = 0.05

@@ -60,6 +60,7 @@ from pzd.diagnosis.verdict import (
     knee_verdict,
     no_prediction_note,
     no_slip_diagnosis,
+    nodes_note,
     nuisance_trend,
     one_stop_note,
     temperature_note,
@@ -135,6 +136,8 @@ def diagnose_setting(
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     beside = knee_note(identify.law, decision.verdict, baseline.base)
+    if decision.verdict == "unexplained":
+        beside += nodes_note(prepared, baseline.base, control.name)
     if "end_stop" in selection.adopted:
         beside += one_stop_note(final, [each.record.displacement for each in recorded])
     if "temperature_drift" not in selection.adopted:

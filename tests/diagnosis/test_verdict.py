@@ -19,6 +19,7 @@ from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.adoption import Adoption
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import Problem
@@ -31,6 +32,7 @@ from pzd.diagnosis.verdict import (
     NuisanceTrend,
     _hints,
     knee_note,
+    nodes_note,
     nuisance_trend,
     temperature_note,
     with_parts_told,
@@ -496,3 +498,12 @@ def test_a_friction_next_to_none_does_not_fade() -> None:
         for t, friction in ((24.0, 1e-6), (57.0, 0.5))
     )
     assert not temperature_note(base, 0.2)
+
+
+def test_nodes_between_those_that_were_tested_are_advised_where_the_voltage_moves() -> None:
+    """T0 that bends between two levels is no missing effect, and no test at a constant level shows it."""
+    base = [BaseRow(voltage_V=U, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6) for U in (0.0, 50.0, 150.0)]
+    moving, constant = (cast("PreparedRecord", SimpleNamespace(constant=each)) for each in (False, True))
+    assert "identify: {nodes: [0, 25, 50, 100, 150]}" in nodes_note([constant, moving], base, "voltage")
+    assert nodes_note([constant], base, "voltage") == ""
+    assert nodes_note([moving], base[:1], "voltage") == ""
