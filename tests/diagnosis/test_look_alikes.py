@@ -117,6 +117,19 @@ C_ALONE = {"asymmetry": {"alpha": 0.2}, "preload_offset": {"F_0": -0.2 * 300.0}}
     ("effects", "k", "nearly"),
     [
         (PLAY, 2e5, {"frame_compliance": "lash"}),
+        # A gas of exponent 1.38 leaves 2.5 % of its force beside one of 1.3, a gas of 1.0 -13 %, a zero anything.
+        (
+            {"accumulator": {"F_g": 400.0, "L": 0.08}, "preload_offset": {"F_0": 10.0}},
+            1e6,
+            {"preload_offset": "accumulator"},
+        ),
+        (
+            {"accumulator": {"F_g": 400.0, "L": 0.08}, "preload_offset": {"F_0": -50.0}},
+            1e6,
+            {"preload_offset": "accumulator"},
+        ),
+        ({"accumulator": {"F_g": 400.0, "L": 0.08}, "preload_offset": {"F_0": 20.0}}, 1e6, {}),
+        ({"accumulator": {"F_g": 400.0, "L": 0.08}, "preload_offset": {"F_0": 400.0}}, 1e6, {}),
         # Half of its way at 400 N: the mount is nearly all that gives.
         ({"frame_compliance": {"d_f": 4e-4, "F_f": 400.0}}, np.inf, {}),
         (C_ALONE, 2e5, {"preload_offset": "asymmetry"}),

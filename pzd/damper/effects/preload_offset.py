@@ -3,6 +3,7 @@
 Law: F_0. Range: gas-charged dampers 50-300 N. Friction that differs between the two directions, T0 (1 + alpha sign(F)),
 is the constant alpha T0 as long as the rod slips. Neither gas nor zero knows the control signal, so an offset that goes
 with it may be an `asymmetry` of the friction alone; one of -alpha T0 beside an `asymmetry` makes it one of C alone.
+Beside an `accumulator`, whose law has one exponent, a gas of another leaves a constant: 13 % of F_g at most.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Beside, Effect, EffectValues, Parameter, Search, growing
+from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 
 LIKE_FRICTION = 0.3
 """Share by which an offset differs from -alpha T0 and may yet be that.
@@ -17,10 +19,17 @@ LIKE_FRICTION = 0.3
 Reason: 0 to 15 % where damping alone differed between the directions (four rigs by a simulator of other authorship)."""
 
 
-def _of_the_friction(values: EffectValues, beside: Beside) -> str | None:
-    """Return `asymmetry` for an offset that goes with the control signal, or undoes the asymmetry of the friction."""
+def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
+    """Return `asymmetry` for an offset that goes with the control signal, or undoes the asymmetry of the friction.
+
+    Or `accumulator` for what a gas of another exponent than that of its law leaves.
+    """
     if isinstance(values["F_0"], tuple):
         return "asymmetry"
+    if "accumulator" in beside.effects:
+        shares = [1.0 - other_gas(exponent)[0] for exponent in EXPONENTS]
+        share = np.divide(values["F_0"], beside.effects["accumulator"]["F_g"])
+        return "accumulator" if np.all((min(shares) <= share) & (share <= max(shares))) else None
     alpha = beside.effects.get("asymmetry", {}).get("alpha", 0.0)
     undone = -np.mean(alpha) * np.array(beside.T0)
     near = np.abs(values["F_0"] - undone) < LIKE_FRICTION * np.abs(undone)
@@ -38,7 +47,7 @@ EFFECT = Effect(
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
-    nearly=_of_the_friction,
+    nearly=_of_friction_or_gas,
     hidden=growing("F_0", lambda s: 0.5 * s.force, either=True),
 )
 
