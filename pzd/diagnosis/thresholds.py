@@ -128,7 +128,9 @@ LONE_END_STOP_BEGINS_BY = 0.9
 
 Reason: a friction that gives by a twentieth of the stroke before it slips was named so (a rig of other authorship)."""
 OTHER_MOTION = 0.05
-"""Difference of amplitude or peak speed from which two motions are not one: far above how well a stand repeats one."""
+"""Difference of amplitude or peak speed, as a share, from which two motions are not one.
+
+Reason: far above how well a stand repeats a motion; not tuned."""
 HALVES_SIGNIFICANCE = 0.001
 """Probability by chance below which halves of the tests disagree about a parameter.
 
