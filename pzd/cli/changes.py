@@ -75,8 +75,9 @@ def _compared(call: Call, second: Path | None, before: str | None, after: str | 
     from pzd.schema.validate import plain_data, write_json
 
     if second is None and (before is None or after is None):
+        got = "--from alone" if before else "--to alone" if after else "one config"
         raise ConfigError(
-            "pzd changes: two states are needed: a second config, or two settings by --from and --to (got one config)"
+            f"pzd changes: two states are needed: a second config, or two settings by --from and --to (got {got})"
         )
     one = call.opened
     other = one if second is None else opened(second, call.runs, call.overrides)

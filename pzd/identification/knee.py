@@ -166,6 +166,8 @@ TRADE_SPEEDS = tuple(float(np.round(np.pi * 0.1 * turns / 60.0, 3)) for turns in
 """Speeds at which dampers are specified [m/s]: peaks of a crank of 100 mm stroke at 10 to 300 revolutions a minute."""
 SPEED_ROUNDING = 1.001
 """Factor within which a test reaches a speed, which is rounded to millimetres a second."""
+NO_FRICTION = 1e-9
+"""Friction, as a share of the peak force, that is none: a search that ends at its limit of 0 leaves 1e-14 N."""
 NO_MISFIT = Misfit(0.0, 0.0)
 GAS_COLUMNS = ("gas_force_N", "gas_spring_N_per_m")
 """Columns of the terms of the gas, gas force and gas spring."""
@@ -183,7 +185,8 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
     """
     misfit, widths = _half_widths(tests, fit, nuisance)
     curve, (force, spring) = fit.curve, fit.gas.tolist()
-    values: dict[str, float] = {"friction_N": curve.friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
+    friction = curve.friction if curve.friction > NO_FRICTION * tests.peak else 0.0
+    values: dict[str, float] = {"friction_N": friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
     values["k_N_per_m"] = curve.stiffness
     for way, direction in enumerate(DIRECTIONS):
         bleed, *of_knee = (f"{direction}_{column}" for column in OF_A_DIRECTION)

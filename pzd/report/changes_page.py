@@ -194,7 +194,8 @@ def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
             before, after = float(cycle.force_before[at]), float(cycle.force_after[at])
             cells += [amount(before, "N"), amount(after, "N"), percent(_growth(before, after))]
         at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
-        rows.append((cycle.after, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
+        test = cycle.after if cycle.before is not None else f"{cycle.after} (before: the model)"
+        rows.append((test, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
     title = "Force at the peak velocity of each test; in % by how much its magnitude grew, a dash where the sign turned"
     return TextTable(title, *_without_control_where_none(header, rows))
 

@@ -419,6 +419,8 @@ DAMPERS = {
     "C4_R8_LF_15in_s C12_R8_LR_15in_s": "C12_R8_LR C4_R8_LF",
     "LF_15in_s_click5 RF_15in_s_click1": "LF_click5 RF_click1",
     "FR_3Hz_150V FL_3Hz_150V": "FL FR",
+    "R10C5_0.5Hz R2C5_0.5Hz": "R10C5 R2C5",
+    "reb2_0.5Hz reb10_0.5Hz": "reb10 reb2",
 }
 
 
@@ -441,6 +443,7 @@ FOLDERS: dict[str, tuple[list[str | None], list[float | None], list[float | None
     "before/1Hz after/1Hz": (["after", "before"], [None], [None]),
     "new/csv/1Hz new/csv/2Hz aged/csv/1Hz aged/csv/2Hz": (["aged", "aged", "new", "new"], [None], [None]),
     "LF/1Hz RF/2Hz": (["LF", "RF"], [None], [None]),
+    "before/1Hz after/2Hz": (["after", "before"], [None], [None]),
     "0V/1Hz 5V/1Hz": ([None, None], [0.0, 5.0], [None]),
     "20degC/1Hz 40degC/1Hz": ([None, None], [None], [20.0, 40.0]),
     "new/0V/1Hz new/5V/1Hz old/0V/1Hz old/5V/1Hz": (["new", "new", "old", "old"], [0.0, 5.0], [None]),

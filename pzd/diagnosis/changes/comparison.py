@@ -278,9 +278,20 @@ class Findings:
             fits = [f for f in self.search.rivals(best, candidate) if not self._same_gas(best, candidate, f)]
             if any(_added(f, best) for f in fits):
                 rivals[candidate.name] = fits
-        if perhaps := self.search.perhaps(best):
+        if self._visible_left(best) and (perhaps := self.search.perhaps(best)):
             rivals[NOTHING] = perhaps
         return best, rivals
+
+    def _visible_left(self, best: Fitted) -> bool:
+        """Whether a fit leaves more beyond the noise than counts as nothing, or how much a model hides.
+
+        Through the model of the first damper what that misses counts as noise.
+        """
+        if any(c.before is None for c in self.comparisons):
+            return True
+        difference = self.difference(best)
+        beyond = float(np.sqrt(max(difference.left_N**2 - difference.noise_N**2, 0.0)))
+        return beyond >= self.diagnose.visible * self.first.force
 
     def _left_out_differs(self) -> str | None:
         """Say by how much worse the first damper predicts the tests that are not compared; None where it does not.

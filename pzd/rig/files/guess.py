@@ -35,6 +35,7 @@ from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (
     CONTROLS,
     DIRECTIONS,
+    STATES,
     Dialect,
     assigned,
     claims,
@@ -470,7 +471,7 @@ def _by_setting(
 
 
 def _settings_of_folders(among: Sequence[Path]) -> dict[Path, str]:
-    """Return by folder its name, where folders name a damper each, or hold tests of the same names: before and after.
+    """Return by folder its name, where folders name a damper or a state each, or hold tests of the same names.
 
     A control signal or temperature in the name is no part of it, and all of it in names that tell nothing else.
     """
@@ -485,7 +486,8 @@ def _settings_of_folders(among: Sequence[Path]) -> dict[Path, str]:
     of = dict(zip(folders, names, strict=True))
     tests = {setting: {path.stem for path in among if of[path.parent] == setting} for setting in settings}
     again = all(any(mine & tests[other] for other in settings - {setting}) for setting, mine in tests.items())
-    return of if again or setting_in_names(names, names) else {}
+    named = all(STATES.search(name) for name in names) or setting_in_names(names, names) is not None
+    return of if again or named else {}
 
 
 def _names_of_folders(folders: Sequence[Path]) -> list[str]:

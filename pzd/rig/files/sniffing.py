@@ -266,8 +266,19 @@ _WORDS_IN_NAMES = {
     "temperature": "temp(?:eratur)?e?",
 }
 """Words before a number whose unit may be missing: current=0.5, pwm40."""
-_CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
-"""C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
+_CLICKERS = (
+    "C[0-9]+_?R[0-9]+",
+    "R[0-9]+_?C[0-9]+",
+    "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)",
+    "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)",
+    "(?i:(?:reb(?:ound)?|comp(?:ression)?|bump)[ _-]?[0-9]+)",
+)
+"""C08_R12, R12C8 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5, reb2."""
+STATES = re.compile(
+    "(?i:(?<![a-z])(?:before|after|old|new|aged|worn|fresh|rebuilt|vorher|nachher|alt|neu|avant|apres|antes|despues)"
+    "(?![a-z]))"
+)
+"""Words for a state of a damper."""
 _DAMPERS = (
     "LF|LR|RF|RR|FL|FR|RL|lf|lr|rf|rr|fl|fr|rl",
     "(?i:(?:front|rear)[ _-]?(?:left|right)|(?:left|right)[ _-]?(?:front|rear)|front|rear|left|right)",
