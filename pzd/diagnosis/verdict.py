@@ -50,7 +50,7 @@ class Decision:
     doubtful: bool = False
     """Whether so much is not excluded that one more test is worth its time."""
     alike: tuple[str, ...] = ()
-    """Adopted effects that are something that looks alike, by their values."""
+    """Adopted effects whose values show that something else, of a like force, is in their place."""
 
 
 Conclusion = tuple[Adoption, Decision]
@@ -577,10 +577,11 @@ def no_slip_diagnosis(rows: Sequence[ParameterRow]) -> Diagnosis:
 
 
 NOT_LOOKED_FOR = "no effect was looked for: identify.law: bingham looks for them, beside one T0 and C"
-"""What is said of effects where the knee law alone was asked."""
 
 
-def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseConfig) -> Diagnosed:
+def knee_verdict(
+    identified: Identified, setting: str | None, config: DiagnoseConfig, effects: str = NOT_LOOKED_FOR
+) -> Diagnosed:
     """Adopt the damper with the knee law unchanged: `none` where it misses nothing visible, else `unexplained`.
 
     Effects are fitted beside one T0 and C; under another law of the element their evidence would mean something else.
@@ -590,6 +591,7 @@ def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseCo
     identified : with the knee law of the setting
     setting : of the rig's settings, the one in use
     config : what is visible
+    effects : what became of effects, for the reason
     """
     rows, damper = identified.knees.of(setting), identified_damper(identified, setting)
     missed = max(row.missed_share for row in rows)
@@ -597,8 +599,7 @@ def knee_verdict(identified: Identified, setting: str | None, config: DiagnoseCo
     law = next(row for row in identified.knees.laws if row.setting == setting)
     diagnosis = Diagnosis.without_effects(
         "unexplained" if missed >= config.visible else "none",
-        f"the knee law of 2-identify/knee.csv is handed on as it was fitted, and {left}; {law.reason}; "
-        f"{NOT_LOOKED_FOR}",
+        f"the knee law of 2-identify/knee.csv is handed on as it was fitted, and {left}; {law.reason}; {effects}",
         gap=None,
     )
     parameters = tuple(map(_knee_parameters, rows))

@@ -47,7 +47,6 @@ from pzd.diagnosis.search.determination import first_undetermined
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.support import support_of
 from pzd.diagnosis.verdict import (
-    NOT_LOOKED_FOR,
     Conclusion,
     Decision,
     alone_note,
@@ -92,13 +91,18 @@ def diagnose_setting(
 ) -> Diagnosed:
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
     if identified.knees.law_of(setting) == "knee":
-        found = knee_verdict(identified, setting, diagnose)
-        if found.diagnosis.verdict == "none" or identify.law != "auto":
-            return found
+        knee = knee_verdict(identified, setting, diagnose)
+        if knee.diagnosis.verdict == "none" or identify.law != "auto":
+            return knee
         # Beside T0, C and k effects are looked for, and what the knee misses may be one of them.
         bingham = replace(identified, knees=Knees())
         other = diagnose_setting(diagnose, identify, stand, rig, bingham, control, setting, jobs)
-        return _better_predicting(found, other, next(row for row in identified.knees.laws if row.setting == setting))
+        law = next(row for row in identified.knees.laws if row.setting == setting)
+        better, words = _beside_knee(other, law)
+        if not better:
+            return knee_verdict(identified, setting, diagnose, words)
+        reason = f"{other.diagnosis.reason}; {words}"
+        return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
     records, saturated = data.unsaturated_records(rig, setting)
     records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
@@ -164,31 +168,22 @@ def diagnose_setting(
     return Diagnosed(diagnosis, final, baseline, rows, shapes)
 
 
-def _better_predicting(knee: Diagnosed, other: Diagnosed, law: LawRow) -> Diagnosed:
-    """Return the damper with the knee law, or the one beside T0, C and k where it predicts kept-back tests far better.
+def _beside_knee(other: Diagnosed, law: LawRow) -> tuple[bool, str]:
+    """Return whether a damper beside T0, C and k predicts kept-back tests far better than the knee law, and the words.
 
     Parameters
     ----------
-    knee, other : the two dampers
+    other : the damper, with its prediction
     law : of the setting, with what the knee law predicts
     """
     found = other.diagnosis.prediction
     if law.W_s_knee is None or found is None or found.hold_out != "tests":
-        return _told_of_effects(knee, "beside one T0 and C effects were looked for, and no kept-back test can tell")
-    if found.W_s > thresholds.BETTER_THAN_KNEE * law.W_s_knee:
-        told = (
-            f"beside one T0 and C {' and '.join(other.diagnosis.effects) or 'no effect'} was found, and kept-back tests"
-        )
-        return _told_of_effects(knee, f"{told} are predicted with W_s {found.W_s:.3g}: the knee law stays")
-    words = f"the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
-    reason = f"{other.diagnosis.reason}; {words}, this damper with {found.W_s:.3g}: it is handed on"
-    return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
-
-
-def _told_of_effects(knee: Diagnosed, words: str) -> Diagnosed:
-    """Return the knee law's damper with what became of the search for effects in its reason."""
-    reason = knee.diagnosis.reason.replace(NOT_LOOKED_FOR, words)
-    return replace(knee, diagnosis=knee.diagnosis.model_copy(update={"reason": reason}))
+        return False, "beside one T0 and C effects were looked for, and no kept-back test can tell"
+    if found.W_s <= thresholds.BETTER_THAN_KNEE * law.W_s_knee:
+        words = f"the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
+        return True, f"{words}, this damper with {found.W_s:.3g}: it is handed on"
+    names = " and ".join(other.diagnosis.effects) or "no effect"
+    return False, f"one T0 and C with {names} predict kept-back tests with W_s {found.W_s:.3g}: the knee law stays"
 
 
 def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:

@@ -20,16 +20,17 @@ Reason: 0 to 15 % where damping alone differed between the directions (four rigs
 
 
 def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
-    """Return `asymmetry` for an offset that goes with the control signal, or undoes the asymmetry of the friction.
+    """Return what else an offset may be by its value and what stands beside it; None for an offset.
 
-    Or `accumulator` for what a gas of another exponent than that of its law leaves.
+    `asymmetry` where it goes with the control signal, or undoes the asymmetry of the friction; `accumulator` where it
+    is what a gas of another exponent than that of its law leaves.
     """
     if isinstance(values["F_0"], tuple):
         return "asymmetry"
-    if "accumulator" in beside.effects:
-        shares = [1.0 - other_gas(exponent)[0] for exponent in EXPONENTS]
-        share = np.divide(values["F_0"], beside.effects["accumulator"]["F_g"])
-        return "accumulator" if np.all((min(shares) <= share) & (share <= max(shares))) else None
+    gas = np.asarray(beside.effects.get("accumulator", {}).get("F_g", 0.0))
+    least, most = sorted(1.0 - other_gas(exponent)[0] for exponent in EXPONENTS)
+    if gas.any() and np.all((least * gas <= values["F_0"]) & (values["F_0"] <= most * gas)):
+        return "accumulator"
     alpha = beside.effects.get("asymmetry", {}).get("alpha", 0.0)
     undone = -np.mean(alpha) * np.array(beside.T0)
     near = np.abs(values["F_0"] - undone) < LIKE_FRICTION * np.abs(undone)
