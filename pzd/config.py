@@ -301,6 +301,6 @@ def setting_in_use(chosen: str | None, found: Sequence[str | None]) -> str | Non
     if chosen not in names:
         near = nearest(chosen, names)
         hint = f"; did you mean {near}?" if near else ""
-        hint = hint or ("" if names else f"; write `setting: {chosen}` into the entries of rig.files that are it")
+        hint = hint or ("" if names else f"; write `setting: {chosen}` into the entries of `rig` that are it")
         raise ConfigError(f"setting: no record of the rig has this setting; there is {listed}{hint} (got {chosen})")
     return chosen

@@ -41,9 +41,7 @@ def support_of(adoption: Adoption, validation: CrossValidation, alike: Collectio
     if whole is None or plain is None:
         return {}
     own, before = validation.error_to_first_order(*whole), validation.error_to_first_order(*plain)
-    fitted, total = whole[1].damper, float(before.error.sum())
-    if total > FIRST_ORDER * (refitted := float(adoption.baseline_error.error.sum())) > 0.0:
-        total = refitted
+    fitted, total = whole[1].damper, _total(before, adoption.baseline_error)
 
     def without(name: str) -> PredictionError | None:
         fewer = validation.fit_by_criterion(fitted.without_effects(name), validation.no_samples)
@@ -81,9 +79,15 @@ def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, s
     return found
 
 
-FIRST_ORDER = 2.0
-"""Times the error of refits above which that to first order is none: where a plain damper misses more than half of the
-force, a fold without its most telling test is far from linear."""
+WITHIN_FIRST_ORDER = 2.0
+"""Times the error of refits up to which that to first order stands for it: where a plain damper misses more than half
+of the force, a fold without its most telling test is far from linear, and thousands of times were seen."""
+
+
+def _total(first_order: PredictionError, refitted: PredictionError) -> float:
+    """Return the sum of squared errors of the baseline [N^2], to first order as those beside it where that holds."""
+    estimate, exact = float(first_order.error.sum()), float(refitted.error.sum())
+    return exact if 0.0 < WITHIN_FIRST_ORDER * exact < estimate else estimate
 
 
 def _share(own: PredictionError, without: PredictionError, total: float) -> float:

@@ -32,7 +32,7 @@ from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from
 from pzd.diagnosis.search.candidates import force_change
 from pzd.diagnosis.search.determination import first_undetermined, varying_strengths
 from pzd.fit.intervals import LEVEL
-from pzd.record import Array
+from pzd.record import CONSTANT_SHARE, Array
 from pzd.schema.errors import counted
 from pzd.signals.measures import rms
 from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
@@ -669,7 +669,9 @@ def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], sign
     levels = sorted({row.voltage_V for row in base if row.voltage_V is not None})
     if all(each.constant for each in prepared) or len(levels) < 2:
         return ""
-    finer = sorted({*levels, *(0.5 * (low + high) for low, high in pairwise(levels))})
+    scale = max(map(abs, (*levels, levels[-1] - levels[0])))
+    wide = [pair for pair in pairwise(levels) if pair[1] - pair[0] > 4.0 * CONSTANT_SHARE * scale]
+    finer = sorted({*levels, *(0.5 * (low + high) for low, high in wide)})  # identify refuses nodes closer than half
     return (
         f"; between {len(levels)} levels T0, C and k are straight lines over the {signal}: "
         f"identify: {{nodes: [{', '.join(f'{each:.4g}' for each in finer)}]}} tells whether they bend there"

@@ -140,7 +140,7 @@ def diagnose_setting(
     handed_on = fitted_to_all(adoption, validation, diagnose.force)
     final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
     beside = knee_note(identify.law, decision.verdict, baseline.base)
-    if decision.verdict == "unexplained":
+    if decision.verdict == "unexplained" and identify.nodes is None:
         beside += nodes_note(prepared, baseline.base, control.name)
     if "end_stop" in selection.adopted:
         beside += one_stop_note(final, [each.record.displacement for each in recorded])

@@ -180,8 +180,13 @@ class Damper(Result):
         ------
         TypeError, ValueError : when an argument is no such array, time does not increase, or the voltage is missing
         """
+        return self._force_along((time, displacement, velocity), voltage, temperature, as_recorded=as_recorded)
+
+    def _force_along(self, path: tuple[Any, Any, Any], voltage: Any, temperature: Any, *, as_recorded: bool) -> Array:
+        """Compute the force along time, displacement and velocity."""
         from pzd.damper.compose import respond, sensors_of
 
+        time, displacement, velocity = path
         model = self.model if as_recorded else self.model.without_effects(*sensors_of(self.model))
         return respond(model, self.motion(time, displacement, voltage, temperature, velocity))
 
@@ -328,18 +333,9 @@ class CurveDamper(Damper):
         return float(np.max(np.abs(self.measured.velocity)))
 
     @override
-    @in_python
-    def force(
-        self,
-        time: Any,
-        displacement: Any,
-        voltage: Any = None,
-        temperature: Any = None,
-        velocity: Any = None,
-        *,
-        as_recorded: bool = True,
-    ) -> Array:
-        """Compute the force along a motion, which is that of the curve at its velocity; see `Damper.force`."""
+    def _force_along(self, path: tuple[Any, Any, Any], voltage: Any, temperature: Any, *, as_recorded: bool) -> Array:
+        """Compute the force of the curve at the velocity of the motion."""
+        time, displacement, velocity = path
         motion = self.motion(time, displacement, None, None, velocity)
         return self.curve(motion.velocity, voltage)
 

@@ -40,9 +40,9 @@ _MOST_SHAPES = 2
 """How many shapes of the residual force, each by itself."""
 _LEAST_SHARE = 0.02
 """Share of the gap from which an effect stands in the headline: of a hundredth rounding makes something or nothing."""
+_NOTHING_LEFT = "nothing visible is left, but what closes the gap may be something else"
+"""What stands in the place of what is left where that is not visible, and the verdict is `unexplained` all the same."""
 
-_NOT_ITS_NAME = "the whole is closed, but not by what its name says"
-"""What is left of a gap that is closed where some effect is something that looks alike."""
 _LEAST_OWN = 0.1
 """Share of the noise floor that the tests' own zero, gain and delay take from which they stand beside the noise: in
 r.m.s., as the headline has it, less is a twentieth."""
@@ -113,7 +113,7 @@ def headline(diagnosis: Diagnosis) -> str:
     words = [known] if known else []
     words += [f"{' and '.join(useful)} {predict}"] if useful else []
     left = f"{100.0 * diagnosis.left_of_peak:.2g} % of peak has no name"
-    return f"but {'; '.join(words)}; {left if diagnosis.left_of_peak >= VISIBLE else _NOT_ITS_NAME}"
+    return f"but {'; '.join(words)}; {left if diagnosis.left_of_peak >= VISIBLE else _NOTHING_LEFT}"
 
 
 def _known_of(diagnosis: Diagnosis, effect: str) -> str:

@@ -444,6 +444,7 @@ FOLDERS: dict[str, tuple[list[str | None], list[float | None], list[float | None
     "new/csv/1Hz new/csv/2Hz aged/csv/1Hz aged/csv/2Hz": (["aged", "aged", "new", "new"], [None], [None]),
     "LF/1Hz RF/2Hz": (["LF", "RF"], [None], [None]),
     "before/1Hz after/2Hz": (["after", "before"], [None], [None]),
+    "before/click5 before/click1 after/click5": (["after click5", "before click1", "before click5"], [None], [None]),
     "0V/1Hz 5V/1Hz": ([None, None], [0.0, 5.0], [None]),
     "20degC/1Hz 40degC/1Hz": ([None, None], [None], [20.0, 40.0]),
     "new/0V/1Hz new/5V/1Hz old/0V/1Hz old/5V/1Hz": (["new", "new", "old", "old"], [0.0, 5.0], [None]),
@@ -467,6 +468,13 @@ def test_folders_with_the_same_tests_are_states_of_a_damper_unless_they_name_a_l
     assert sorted((entry.setting for entry in entries), key=str) == settings
     assert sorted({entry.voltage_V for entry in entries}, key=str) == voltages
     assert sorted({entry.temperature_degC for entry in entries}, key=str) == temperatures
+
+
+def test_a_frequency_behind_a_direction_is_no_position_of_a_clicker(tmp_path: Path) -> None:
+    """Rebound and compression in files of their own: rebound0.5Hz is no click 0."""
+    columns, head = [numbers(values) for values in (TIME, X, FORCE)], ["time_s,displacement_m,force_N"]
+    files = [stored(tmp_path / f"{name}.csv", head, columns, ",") for name in ("rebound0.5Hz", "rebound_1.5Hz")]
+    assert not any("setting" in line for line in guessed(files))
 
 
 def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:

@@ -168,6 +168,11 @@ def _error_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | Non
 # --- What is found
 
 
+def _beyond_noise(difference: Difference) -> float:
+    """Return what is left of a difference beyond the noise, r.m.s. [N]."""
+    return float(np.sqrt(max(difference.left_N**2 - difference.noise_N**2, 0.0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Findings:
     """The fitted changes, and what of them is reported."""
@@ -267,8 +272,7 @@ class Findings:
 
     def _left_share(self, difference: Difference) -> float:
         whole = difference.rms_N**2 - difference.noise_N**2
-        left = max(difference.left_N**2 - difference.noise_N**2, 0.0)
-        return float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
+        return _beyond_noise(difference) / float(np.sqrt(whole)) if whole > 0.0 else 0.0
 
     def _settled(self) -> tuple[Fitted, dict[str, list[Fitted]]]:
         """Return the changes, a gas force in the place of a load-cell zero where they show gas, and their rivals."""
@@ -283,15 +287,13 @@ class Findings:
         return best, rivals
 
     def _visible_left(self, best: Fitted) -> bool:
-        """Whether a fit leaves more beyond the noise than counts as nothing, or how much a model hides.
+        """Whether a fit leaves more beyond the noise than counts as nothing.
 
-        Through the model of the first damper what that misses counts as noise.
+        Taken for granted where a test is compared through the model, since what that misses counts as noise.
         """
         if any(c.before is None for c in self.comparisons):
             return True
-        difference = self.difference(best)
-        beyond = float(np.sqrt(max(difference.left_N**2 - difference.noise_N**2, 0.0)))
-        return beyond >= self.diagnose.visible * self.first.force
+        return _beyond_noise(self.difference(best)) >= self.diagnose.visible * self.first.force
 
     def _left_out_differs(self) -> str | None:
         """Say by how much worse the first damper predicts the tests that are not compared; None where it does not.

@@ -457,17 +457,22 @@ def _by_setting(
     paths: Sequence[Path], among: Sequence[Path]
 ) -> Iterator[tuple[str, Sequence[Path], _Setting | None, str | None]]:
     """Yield a path pattern, its files, and their setting or else the pattern that finds it in their names."""
-    names = [path.stem for path in among]
-    apart: Sequence[str | None] = settings_apart([path.stem for path in paths], names) or [None] * len(paths)
-    of_folders = _settings_of_folders(among)
-    for setting in dict.fromkeys(apart):
-        mine = [path for path, its in zip(paths, apart, strict=True) if its == setting]
+    names, stems = [path.stem for path in among], [path.stem for path in paths]
+    of_folders, in_files = _settings_of_folders(among), setting_in_names(stems, names)
+    apart: Sequence[str | None] = settings_apart(stems, names) or [None] * len(paths)
+    if of_folders and in_files:  # of before/click5 both
+        apart = [setting_of(in_files, path) for path in paths]
+    both = ((of_folders.get(path.parent), its) for path, its in zip(paths, apart, strict=True))
+    settings = [" ".join(filter(None, pair)) for pair in both]
+    whence = _OF_FOLDER if of_folders else "the files' names"
+    for setting in dict.fromkeys(settings):
+        mine = [path for path, its in zip(paths, settings, strict=True) if its == setting]
         for path, members in _patterns(mine):
             pattern = None if setting else setting_in_names([m.stem for m in members], names)
-            told = _Setting(setting, "the files' names") if setting else None
-            if told is None and pattern is None and (folder := of_folders.get(members[0].parent)):
-                told = _Setting(folder, "the folder's name: remove it where all are one damper in one state")
-            yield path, members, told, pattern
+            yield path, members, _Setting(setting, whence) if setting else None, pattern
+
+
+_OF_FOLDER = "the folder's name: remove it, and `setting` above, where all are one damper in one state"
 
 
 def _settings_of_folders(among: Sequence[Path]) -> dict[Path, str]:
@@ -476,12 +481,12 @@ def _settings_of_folders(among: Sequence[Path]) -> dict[Path, str]:
     A control signal or temperature in the name is no part of it, and all of it in names that tell nothing else.
     """
     folders = sorted({path.parent for path in among})
-    names = _names_of_folders(folders)
+    whole = names = _names_of_folders(folders)
     for quantity in (*(control.name for control in CONTROLS), TEMPERATURE.name):
         if found := value_in_names(names, quantity):
             names = [re.sub(found[0], "", name).strip(" _-") for name in names]
     settings = set(names)
-    if len(settings) < 2 or (names != _names_of_folders(folders) and len(settings) == len(folders)):
+    if len(settings) < 2 or (names != whole and len(settings) == len(folders)):
         return {}
     of = dict(zip(folders, names, strict=True))
     tests = {setting: {path.stem for path in among if of[path.parent] == setting} for setting in settings}

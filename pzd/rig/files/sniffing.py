@@ -271,7 +271,7 @@ _CLICKERS = (
     "R[0-9]+_?C[0-9]+",
     "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)",
     "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)",
-    "(?i:(?:reb(?:ound)?|comp(?:ression)?|bump)[ _-]?[0-9]+)",
+    "(?i:(?:reb(?:ound)?|comp(?:ression)?|bump)[0-9]+)(?![.,][0-9])",
 )
 """C08_R12, R12C8 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5, reb2."""
 STATES = re.compile(
