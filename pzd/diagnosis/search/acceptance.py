@@ -85,13 +85,10 @@ def misplaced_end_stop(damper: Damper, stroke: float, motions: Sequence[tuple[Ar
     begins = float(np.min(damper.effects["end_stop"]["x_e"]))
     if begins - abs(damper.zero_m) < thresholds.END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
-    reaches = np.array([float(np.max(np.abs(x - damper.zero_m))) for x, _ in motions])
-    fastest = np.array([float(np.max(np.abs(v))) for _, v in motions])
-    there = reaches > begins
-    told = any(
-        np.ptp(of[there]) > thresholds.OTHER_MOTION * of[there].max() for of in (reaches, fastest) if there.any()
-    )
-    by = thresholds.END_STOP_BEGINS_BY if told else thresholds.LONE_END_STOP_BEGINS_BY
+    sizes = np.array([[np.max(np.abs(x - damper.zero_m)), np.max(np.abs(v))] for x, v in motions])
+    there = sizes[sizes[:, 0] > begins]  # (m, 2) reach and largest speed of the motions that come to the stop
+    by_two = there.size > 0 and bool(np.any(np.ptp(there, axis=0) > thresholds.OTHER_MOTION * there.max(axis=0)))
+    by = thresholds.END_STOP_BEGINS_BY if by_two else thresholds.LONE_END_STOP_BEGINS_BY
     if begins - abs(damper.zero_m) > by * stroke:
         return "stand-in: begins where the tests turn round, as everything at a reversal does"
     return None
