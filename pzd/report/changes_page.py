@@ -125,9 +125,10 @@ def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
     stand = listed(list(dict.fromkeys(spelled(c.name) for c in changes.changes if c.of == "stand")))
     d = changes.difference
     size = f"{amount(d.rms_N, 'N')} r.m.s., {percent(d.share_of_peak)} of peak"
+    beside = "And something that has no name" if names and changes.verdict == "unexplained" else ""
     left = f"{amount(d.left_N, 'N')} of it are left, {amount(d.noise_N, 'N')} of them noise."
     found = [
-        Card("What changed?", names or _HEADLINES[changes.verdict], f"{_HEADLINES[changes.verdict]}."),
+        Card("What changed?", names or _HEADLINES[changes.verdict], f"{beside or _HEADLINES[changes.verdict]}."),
         Card("How much?", size, left),
     ]
     if stand:

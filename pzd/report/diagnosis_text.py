@@ -276,7 +276,10 @@ def next_test_line(test: NextTest, unit: str) -> str:
     peaks = ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
     reached = [shown(value, of) for value, of in peaks if value is not None]
     far = f", up to {' and '.join(reached)}" if reached else ""
-    aim = f" to tell {' from '.join(test.separates)}" if test.separates else " to settle what these tests leave open"
+    names = [name for name in test.separates if name != "nothing"]
+    aim = f" to tell {' from '.join(names)}" if names else " to settle what these tests leave open"
+    if len(names) == 1 or len(names) < len(test.separates):
+        aim = f" to tell whether it is {' or '.join(names)}"
     if test.between_voltage_V is not None:
         low, high = (shown(voltage) for voltage in test.between_voltage_V)
         aim = f", since between {low} and {high} {unit} the force is known least"
