@@ -19,7 +19,13 @@ from pzd.schema.model import Frozen
 LawName = Literal["bingham", "knee"]
 Direction = Literal["rebound", "compression"]
 DIRECTIONS: tuple[Direction, ...] = ("rebound", "compression")
-OF_A_DIRECTION = ("bleed_Ns_per_m", "knee_force_N", "knee_velocity_m_per_s", "blow_off_Ns_per_m")
+OF_A_DIRECTION = (
+    "bleed_Ns_per_m",
+    "bleed_square_Ns2_per_m2",
+    "knee_force_N",
+    "knee_velocity_m_per_s",
+    "blow_off_Ns_per_m",
+)
 """The columns of a direction, behind its name."""
 OF_BOTH = ("gas_force_N", "friction_N")
 """The columns that both directions share and the trade names with them."""
@@ -32,9 +38,13 @@ class KneeRow(ConditionRow):
     """
 
     rebound_bleed_Ns_per_m: float = Field(gt=0.0)
-    """Slope up to the knee."""
+    """Slope up to the knee; at standstill, where there is a square part."""
     rebound_bleed_Ns_per_m_low95: float
     rebound_bleed_Ns_per_m_high95: float
+    rebound_bleed_square_Ns2_per_m2: float | None = Field(default=None, ge=0.0)
+    """Force over the square of the speed, beside it; empty where the bleed is straight."""
+    rebound_bleed_square_Ns2_per_m2_low95: float | None = None
+    rebound_bleed_square_Ns2_per_m2_high95: float | None = None
     rebound_knee_force_N: float | None = Field(ge=0.0)
     """With the seal friction, without the gas."""
     rebound_knee_force_N_low95: float | None
@@ -49,6 +59,9 @@ class KneeRow(ConditionRow):
     compression_bleed_Ns_per_m: float = Field(gt=0.0)
     compression_bleed_Ns_per_m_low95: float
     compression_bleed_Ns_per_m_high95: float
+    compression_bleed_square_Ns2_per_m2: float | None = Field(default=None, ge=0.0)
+    compression_bleed_square_Ns2_per_m2_low95: float | None = None
+    compression_bleed_square_Ns2_per_m2_high95: float | None = None
     compression_knee_force_N: float | None = Field(ge=0.0)
     compression_knee_force_N_low95: float | None
     compression_knee_force_N_high95: float | None
@@ -285,6 +298,8 @@ def _knee(row: KneeRow) -> dict[str, float]:
         "C_reb": rebound if row.rebound_blow_off_Ns_per_m is None else row.rebound_blow_off_Ns_per_m,
         "F_comp": NO_KNEE if row.compression_knee_force_N is None else row.compression_knee_force_N,
         "C_comp": compression if row.compression_blow_off_Ns_per_m is None else row.compression_blow_off_Ns_per_m,
+        "q_reb": row.rebound_bleed_square_Ns2_per_m2 or 0.0,
+        "q_comp": row.compression_bleed_square_Ns2_per_m2 or 0.0,
     }
 
 

@@ -172,6 +172,8 @@ class Parameter:
     """Of a position along the stroke: the words between its value and the displacement it is counted from."""
     with_friction: bool = False
     """Whether it changes with the voltage as T0 does: it is fitted per voltage, in proportion to T0."""
+    optional: bool = False
+    """Whether a damper may leave it out and have the neutral value, as those that were written before it was there."""
 
     def admits(self, value: float) -> bool:
         """Return whether the value lies within the limits."""
@@ -304,9 +306,9 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
         "viscous_force": Law(("w", "C"), ("viscous_slope", "viscous_speed")),
         "viscous_slope": Law(("w", "C"), suffices=False),
         "viscous_speed": Law(("viscous", "C"), suffices=False),
-        "extra_force": Law(("w",), ("extra_slope",)),
-        "extra_slope": Law(("w",), suffices=False),
-        "extra_speed": Law(("force", "C"), suffices=False),
+        "extra_force": Law(("w", "side"), ("extra_slope",)),
+        "extra_slope": Law(("w", "side"), suffices=False),
+        "extra_speed": Law(("force", "C", "side"), suffices=False),
         "opens_at": Law(("T0", "side"), ("slope_beyond",)),
         "slope_beyond": Law(("side",), suffices=False),
     },

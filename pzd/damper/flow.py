@@ -67,14 +67,14 @@ def viscous_speed(s: float, p: Row, side: float) -> float:
 def smooth_force_of(s: float, p: Row, side: float) -> float:
     """Compute |F| [N] at a viscous force s >= 0 [N], the relief valve shut."""
     w = viscous_speed(s, p, side)
-    return kernels.yield_force(w, p[T0] * kernels.direction_factor(side, p), p) + s + kernels.extra_force(w, p)
+    return kernels.yield_force(w, p[T0] * kernels.direction_factor(side, p), p) + s + kernels.extra_force(w, side, p)
 
 
 @compiled
 def smooth_rise(w: float, p: Row, side: float) -> float:
     """Compute d|F|/ds >= 1 of `smooth_force_of` at a flow speed w [m/s]."""
     factor = kernels.direction_factor(side, p)
-    bend = kernels.yield_slope(w, p[T0] * factor, p) + kernels.extra_slope(w, p)
+    bend = kernels.yield_slope(w, p[T0] * factor, p) + kernels.extra_slope(w, side, p)
     if bend == 0.0:
         return 1.0
     return 1.0 + bend / kernels.viscous_slope(w, damping(p, side), p)
@@ -84,14 +84,14 @@ def smooth_rise(w: float, p: Row, side: float) -> float:
 def smooth_force(w: float, p: Row, side: float) -> float:
     """Compute |F| [N] at a flow speed w >= 0 [m/s], the relief valve shut."""
     friction = kernels.yield_force(w, p[T0] * kernels.direction_factor(side, p), p)
-    return friction + viscous_force(w, p, side) + kernels.extra_force(w, p)
+    return friction + viscous_force(w, p, side) + kernels.extra_force(w, side, p)
 
 
 @compiled
 def smooth_slope(w: float, p: Row, side: float) -> float:
     """Compute the slope [N s/m] of `smooth_force`; infinite at w = 0 where the fluid thins."""
     friction = kernels.yield_slope(w, p[T0] * kernels.direction_factor(side, p), p)
-    return friction + kernels.viscous_slope(w, damping(p, side), p) + kernels.extra_slope(w, p)
+    return friction + kernels.viscous_slope(w, damping(p, side), p) + kernels.extra_slope(w, side, p)
 
 
 @compiled
@@ -99,7 +99,7 @@ def speed_explicit(p: Row) -> bool:
     """Return whether `smooth_speed` is a closed form."""
     if not kernels.yield_sharp(p):
         return False
-    return kernels.extra_none(p) or (kernels.viscous_straight(p) and kernels.extra_speed(1.0, p[C], p) >= 0.0)
+    return kernels.extra_none(p) or (kernels.viscous_straight(p) and kernels.extra_speed(1.0, p[C], 1.0, p) >= 0.0)
 
 
 @compiled
@@ -111,7 +111,7 @@ def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
         if kernels.extra_none(p):
             return kernels.viscous_speed(over, slope, p)
         if kernels.viscous_straight(p):
-            speed = kernels.extra_speed(over, slope, p)
+            speed = kernels.extra_speed(over, slope, side, p)
             if speed >= 0.0:
                 return speed
     if kernels.viscous_straight(p):
@@ -152,14 +152,14 @@ def _searched_thinning(force: float, p: Row, side: float, guess: float) -> float
         return 0.0
     low, high, friction = 0.0, force, p[T0] * kernels.direction_factor(side, p)
     if guess > 0.0 and smooth_rise(guess, p, side) < 2.0:  # the rest changes less by the speed than s does
-        s = force - kernels.yield_force(guess, friction, p) - kernels.extra_force(guess, p)
+        s = force - kernels.yield_force(guess, friction, p) - kernels.extra_force(guess, side, p)
     else:
         s = viscous_force(guess, p, side)
     if not low < s < high:
         s = 0.5 * high
     for _ in range(_NEWTON_STEPS):
         w = viscous_speed(s, p, side)
-        miss = kernels.yield_force(w, friction, p) + s + kernels.extra_force(w, p) - force
+        miss = kernels.yield_force(w, friction, p) + s + kernels.extra_force(w, side, p) - force
         if miss > 0.0:
             high = s
         else:

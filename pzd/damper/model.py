@@ -115,7 +115,7 @@ def _check_effect(name: str, values: EffectValues) -> None:
         raise InsideError(f"no effect is called {name}; {hint}", name, of_key=True)
     wanted = {p.name for p in effects[name].parameters}
     given = set(values) - {NODE_VOLTAGES}
-    if given != wanted:
+    if given != wanted - {p.name for p in effects[name].parameters if p.optional and p.name not in given}:
         unknown = sorted(given - wanted)
         says = f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})"
         raise InsideError(says, name, *unknown[:1], of_key=bool(unknown))

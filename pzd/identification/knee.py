@@ -41,7 +41,7 @@ from pzd.identification.prepared_record import fitted_records, prepare, split_by
 from pzd.identification.trust import WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
-from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels
+from pzd.record import SAME_TEMPERATURE, Condition, Labels
 from pzd.schema.errors import ConfigError
 from pzd.signals.measures import VISIBLE, criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
@@ -188,15 +188,20 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
     friction = curve.friction if curve.friction > NO_FRICTION * tests.peak else 0.0
     values: dict[str, float] = {"friction_N": friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
     values["k_N_per_m"] = curve.stiffness
+    bent = ["friction_N"]  # what may be none
     for way, direction in enumerate(DIRECTIONS):
-        bleed, *of_knee = (f"{direction}_{column}" for column in OF_A_DIRECTION)
+        bleed, square, *of_knee = (f"{direction}_{column}" for column in OF_A_DIRECTION)
         values[bleed] = curve.bleed[way]
+        if fit.form.has_square[way]:
+            values[square] = curve.square[way]
+            bent.append(bleed)
         if fit.form.has_knee[way]:
             shape = curve.knee_force(way), curve.knee_speed[way], curve.blow_off[way]
             values |= zip(of_knee, shape, strict=True)
     cells: dict[str, float | None] = {}
     for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
-        scale = "positive" if name == "friction_N" else "linear" if name.startswith("gas") else "log"
+        nonnegative = name in bent or "square" in name
+        scale = "positive" if nonnegative else "linear" if name.startswith("gas") else "log"
         left_out = name in GAS_COLUMNS and name not in widths
         width = 0.0 if left_out else widths.get(name)
         cells |= interval_columns(name, values.get(name), width, scale, WIDEST_LOGARITHM)
@@ -209,7 +214,7 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
             "W_s": fit.criterion,
             "rmse_N": rms(fit.residuals),
             "missed_share": misfit.share,
-            "status": _status(values, widths, misfit, tests.measured, converged=fit.converged),
+            "status": _status(values, widths, fit, misfit, tests),
         }
     )
 
@@ -236,22 +241,25 @@ def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
 def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[Misfit, dict[str, float]]:
     """Return the misfit of the law, and the half widths of the 95 % intervals by column.
 
-    For the force of a knee it replaces its speed as parameter: dF/dF_k = (dF/dw_k) / C, and T0 and C act at constant
-    F_k. The curve of any damper is round and the two lines are a reading of it: an interval holds what the same reading
-    of other tests would give; the misfit of the law stands in the status and widens no interval.
+    For the force of a knee it replaces its speed as parameter: dF/dF_k = (dF/dw_k) / (C + 2 q w_k), and T0, C and q act
+    at constant F_k. The curve of any damper is round and the two lines are a reading of it: an interval holds what the
+    same reading of other tests would give; the misfit of the law stands in the status and widens no interval.
     """
     form, curve = fit.form, fit.curve
     columns = ["friction_N", *(f"{name}_bleed_Ns_per_m" for name in DIRECTIONS), "k_N_per_m"]
     for way in form.directions_with_knee:
         columns += [f"{DIRECTIONS[way]}_knee_velocity_m_per_s", f"{DIRECTIONS[way]}_blow_off_Ns_per_m"]
+    columns += [f"{DIRECTIONS[way]}_bleed_square_Ns2_per_m2" for way in form.directions_with_square]
     columns += [GAS_COLUMNS[term] for term in form.gas_terms]
     by_force, forces = fit.slopes.copy(), list(columns)
     for way in form.directions_with_knee:
-        place, C = columns.index(f"{DIRECTIONS[way]}_knee_velocity_m_per_s"), curve.bleed[way]
-        slope = fit.slopes[:, place] / C
+        place, w = columns.index(f"{DIRECTIONS[way]}_knee_velocity_m_per_s"), curve.knee_speed[way]
+        slope = fit.slopes[:, place] / (curve.bleed[way] + 2.0 * curve.square[way] * w)
         by_force[:, place] = slope
         by_force[:, 0] -= slope
-        by_force[:, 1 + way] -= slope * curve.knee_speed[way]
+        by_force[:, 1 + way] -= slope * w
+        if form.has_square[way]:
+            by_force[:, columns.index(f"{DIRECTIONS[way]}_bleed_square_Ns2_per_m2")] -= slope * w**2
         forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
     records = [test.record for test in tests.tests]
     prepared = [prepare(record) for record in records]
@@ -269,7 +277,7 @@ WIDEST_LOGARITHM = 20.0
 """Largest half width of an interval in the logarithm: nothing is known then."""
 
 
-_UNITS = ("_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
+_UNITS = ("_Ns2_per_m2", "_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
 
 
 def _quantity_name(column: str) -> str:
@@ -279,17 +287,26 @@ def _quantity_name(column: str) -> str:
 
 
 def _status(
-    values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array, *, converged: bool
+    values: Mapping[str, float], widths: Mapping[str, float], fit: KneeFit, misfit: Misfit, tests: KneeData
 ) -> str:
-    """Return `ok`, or the weak parameters with the reason; the gas is judged against the scale of the friction."""
-    least = {"friction_N": friction_scale(values["friction_N"], rms(measured))}
+    """Return `ok`, or the weak parameters with the reason.
+
+    The gas is judged against the scale of the friction, both parts of a bleed against its force at the knee, or at the
+    largest speed without one: either may be next to none.
+    """
+    least = {"friction_N": friction_scale(values["friction_N"], rms(tests.measured))}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
+    for way in fit.form.directions_with_square:
+        bleed, square, *_ = (f"{DIRECTIONS[way]}_{column}" for column in OF_A_DIRECTION)
+        w = min(fit.curve.knee_speed[way], tests.fastest)
+        least[bleed] = values[bleed] + values[square] * w
+        least[square] = least[bleed] / w
     weak = [
         f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
         if name != "gas_spring_N_per_m" and widths.get(name, 0.0) > WEAK_WIDTH * least.get(name, value)
     ]
-    if not converged:
+    if not fit.converged:
         weak.append("the least squares have not converged")
     if misfit.is_large:
         weak.append(f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")

@@ -1,6 +1,7 @@
 """Least-squares fit of the knee law: criterion (4) over the tests of a condition, gas force and spring profiled out.
 
-Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w - w_k); C, w_k and B of each direction
+Equation: |F| = T0 + C w + q w^2 up to the speed w_k of the knee, then F(w_k) + B (w - w_k); C, q, w_k and B of each
+direction
                                         Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
 """
 
@@ -44,10 +45,14 @@ class KneeCurve(NamedTuple):
     """w_k [m/s]; infinite without a knee."""
     blow_off: tuple[float, float]
     """B [N s/m]; equal to the bleed without a knee."""
+    square: tuple[float, float] = (0.0, 0.0)
+    """q [N s2/m2]; 0 where the bleed is straight."""
 
     def knee_force(self, direction: int) -> float:
-        """Return the force at the knee of one direction [N]."""
-        return self.friction + self.bleed[direction] * self.knee_speed[direction]
+        """Return the force at the knee of one direction [N]; infinite without a knee."""
+        speed = self.knee_speed[direction]
+        bent = self.square[direction] * speed**2 if self.square[direction] else 0.0
+        return self.friction + self.bleed[direction] * speed + bent
 
     @property
     def damping(self) -> float:
@@ -63,6 +68,8 @@ class KneeCurve(NamedTuple):
             "C_reb": self.blow_off[REBOUND],
             "F_comp": forces[COMPRESSION],
             "C_comp": self.blow_off[COMPRESSION],
+            "q_reb": self.square[REBOUND],
+            "q_comp": self.square[COMPRESSION],
         }
 
 
@@ -74,6 +81,8 @@ class KneeForm:
     """Whether both directions share one bleed and have no knee: the Bingham element."""
     has_knee: tuple[bool, bool] = (True, True)
     """Whether rebound and compression have a knee."""
+    has_square: tuple[bool, bool] = (False, False)
+    """Whether their bleeds have a square part."""
     has_gas: tuple[bool, bool] = (True, True)
     """Whether there is a gas force F_0, and a gas spring k_g."""
 
@@ -87,15 +96,29 @@ class KneeForm:
         """Directions with a knee."""
         return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_knee[direction])
 
+    @property
+    def directions_with_square(self) -> tuple[int, ...]:
+        """Directions whose bleed has a square part."""
+        return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_square[direction])
+
+    def without_knee(self, direction: int) -> KneeForm:
+        """Return the selection without the knee of one direction."""
+        return replace(self, has_knee=_without(self.has_knee, direction))
+
+    def without_square(self, direction: int) -> KneeForm:
+        """Return the selection without the square part of the bleed of one direction."""
+        return replace(self, has_square=_without(self.has_square, direction))
+
     def natural(self, curve: KneeCurve) -> Array:
-        """Return the free parameters (p,) in SI units: T0, the bleeds, k, then w_k and B of each knee."""
+        """Return the free parameters (p,) in SI units: T0, the bleeds, k, w_k and B of each knee, q of each square."""
         bleeds = curve.bleed[:1] if self.symmetric else curve.bleed
         knees = [
             value
             for direction in self.directions_with_knee
             for value in (curve.knee_speed[direction], curve.blow_off[direction])
         ]
-        return np.array([curve.friction, *bleeds, curve.stiffness, *knees])
+        squares = [curve.square[direction] for direction in self.directions_with_square]
+        return np.array([curve.friction, *bleeds, curve.stiffness, *knees, *squares])
 
     def curve(self, natural: Array) -> KneeCurve:
         """Return the curve of the free parameters (p,)."""
@@ -105,7 +128,10 @@ class KneeForm:
         speed, slope = [np.inf, np.inf], [*bleed]
         for place, direction in enumerate(self.directions_with_knee):
             speed[direction], slope[direction] = knees[2 * place : 2 * place + 2]
-        return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]))
+        square = [0.0, 0.0]
+        for direction, q in zip(self.directions_with_square, knees[2 * len(self.directions_with_knee) :], strict=True):
+            square[direction] = q
+        return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]), (square[0], square[1]))
 
     def searched(self, curve: KneeCurve, force: float) -> Array:
         """Return the search coordinates (p,): T0 as a share of a force [N], the logarithms of all others."""
@@ -115,6 +141,10 @@ class KneeForm:
     def found(self, searched: Array, force: float) -> KneeCurve:
         """Return the curve at search coordinates (p,)."""
         return self.curve(np.concatenate([searched[:1] * force, np.exp(searched[1:])]))
+
+
+def _without(pair: tuple[bool, bool], direction: int) -> tuple[bool, bool]:
+    return pair[0] and direction != 0, pair[1] and direction != 1
 
 
 BINGHAM_FORM = KneeForm(symmetric=True, has_knee=(False, False))
@@ -209,16 +239,20 @@ MOST_SLOPE = 50.0
 """Largest slope of a start, as a share of peak force over peak speed."""
 
 
-def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
+def grid_start(tests: KneeData, stiffness: float, *, square: bool = False) -> tuple[KneeCurve, Array]:
     """Return the best curve of the grid, and its gas force and gas spring (2,).
 
-    Equation: F = F_0 + k_g x + T0 sign(v) + sum over the directions of C min(|v|, w_k) + B max(|v| - w_k, 0)
+    Equation: F = F_0 + k_g x + T0 sign(v) + sum over the directions of C u + B max(|v| - w_k, 0) + q u^2,
+              u = min(|v|, w_k)
 
     Parameters
     ----------
     tests : that are fitted
     stiffness : of the oil spring, which the grid does not search [N/m]
+    square : whether the bleeds have a square part q, no parameter of which falls below none
     """
+    from scipy.optimize import lsq_linear
+
     v, fastest = tests.speed, tests.fastest
     kept = np.flatnonzero(np.abs(v) > SLOWEST * fastest)
     kept = kept[:: max(1, kept.size // GRID_SAMPLES)]
@@ -228,9 +262,15 @@ def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
         terms = np.column_stack(
             [of_gas, np.sign(v), *(t for direction in (0, 1) for t in _slope_columns(v, direction, knees[direction]))]
         )
+        if square:
+            terms = np.column_stack([terms, *(_square_column(v, direction, knees[direction]) for direction in (0, 1))])
         size = np.linalg.norm(terms, axis=0)
         size[size == 0.0] = 1.0
-        values = np.linalg.lstsq(terms / size, measured, rcond=1e-9)[0] / size
+        if square:
+            low = np.where(np.arange(size.size) < 2, -np.inf, 0.0)  # of the gas alone either sign is natural
+            values = lsq_linear(terms / size, measured, (low, np.inf), method="bvls").x / size
+        else:
+            values = np.linalg.lstsq(terms / size, measured, rcond=1e-9)[0] / size
         left = measured - terms @ values
         found.append((float(left @ left), _clipped_curve(values[2:], knees, stiffness, tests), values[:2]))
     _, curve, gas = min(found, key=lambda each: each[0])
@@ -244,16 +284,25 @@ def _slope_columns(v: Array, direction: int, knee: float) -> tuple[Array, Array]
     return sign * np.minimum(w, knee), sign * np.maximum(w - knee, 0.0)
 
 
+def _square_column(v: Array, direction: int, knee: float) -> Array:
+    """Return the force (N,) of a unit square part up to the knee of one direction."""
+    sign = (1.0, -1.0)[direction]
+    return np.asarray(sign * np.clip(sign * v, 0.0, knee) ** 2)
+
+
 def _clipped_curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: KneeData) -> KneeCurve:
     """Return the curve of a linear fit, its values clipped to those of a damper."""
     unit = tests.peak / tests.fastest
-    slopes = np.clip(values[1:], LEAST_SLOPE * unit, MOST_SLOPE * unit).tolist()
+    slopes = np.clip(values[1:5], LEAST_SLOPE * unit, MOST_SLOPE * unit).tolist()
+    least = LEAST_SLOPE * unit / tests.fastest
+    squares = np.clip(values[5:7], least, MOST_SLOPE * least / LEAST_SLOPE).tolist() or [0.0, 0.0]
     return KneeCurve(
         float(np.clip(values[0], 1e-3 * tests.peak, 0.5 * tests.peak)),
         (slopes[0], slopes[2]),
         stiffness,
         (knees[REBOUND], knees[COMPRESSION]),
         (slopes[1], slopes[3]),
+        (squares[REBOUND], squares[COMPRESSION]),
     )
 
 
@@ -277,7 +326,7 @@ PROBE_EVALUATIONS = 4
 NEAREST_KNEE = 0.01
 """Least knee speed of the search, as a share of the largest speed: below it the oil spring governs the force."""
 SLOPE_RANGE = (1e-3, 1e3)
-"""Smallest and largest slope of the search, in peak force over peak speed."""
+"""Smallest and largest slope of the search, in peak force over peak speed; of a square part over the square of that."""
 STIFFNESS_RANGE = (1e-1, 1e5)
 """Smallest and largest k of the search, in peak force over the range of displacement."""
 
@@ -304,20 +353,23 @@ class KneeFit:
 
 
 def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
-    """Fit the knee law; a direction has a knee where a straight line fits visibly worse.
+    """Fit the knee law; a direction has a knee, and its bleed a square part, where it fits visibly worse without.
 
     Parameters
     ----------
     tests : of the condition
     stiffness : of the oil spring at the start [N/m]
     """
-    best = descend(tests, KneeForm(), *grid_start(tests, stiffness))
-    for direction in best.form.directions_with_knee:
-        has_knee = tuple(each and other != direction for other, each in enumerate(best.form.has_knee))
-        form = replace(best.form, has_knee=(has_knee[0], has_knee[1]))
-        straight = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
-        if not _knee_is_visible(tests, best, straight):
-            best = descend(tests, form, straight.curve, straight.gas)
+    straight = descend(tests, KneeForm(), *grid_start(tests, stiffness))
+    bent = descend(tests, KneeForm(has_square=(True, True)), *grid_start(tests, stiffness, square=True))
+    best = bent if _shows(tests, bent, straight) else straight
+    for left_out, direction in product((KneeForm.without_square, KneeForm.without_knee), (REBOUND, COMPRESSION)):
+        form = left_out(best.form, direction)
+        if form == best.form:
+            continue
+        without = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
+        if not _shows(tests, best, without):
+            best = descend(tests, form, without.curve, without.gas)
     return best
 
 
@@ -335,9 +387,9 @@ def without_gas(tests: KneeData, fit: KneeFit, term: int) -> KneeFit:
     return descend(tests, replace(fit.form, has_gas=(force, spring)), fit.curve, gas)
 
 
-def _knee_is_visible(tests: KneeData, has_knee: KneeFit, straight: KneeFit) -> bool:
-    """Tell whether the knee reduces the residual visibly beyond a straight line."""
-    gained = rms(straight.residuals) ** 2 - rms(has_knee.residuals) ** 2
+def _shows(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
+    """Tell whether a part of the law reduces the residual visibly beyond a fit without it."""
+    gained = rms(without.residuals) ** 2 - rms(fit.residuals) ** 2
     return gained > (VISIBLE * tests.peak) ** 2
 
 
@@ -401,7 +453,9 @@ def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
     spring = [np.log(share * tests.peak / stroke) for share in STIFFNESS_RANGE]
     knee = [np.log(NEAREST_KNEE * tests.fastest), np.log(tests.fastest)]
     bleeds = 1 if form.symmetric else 2
+    square = [each - np.log(tests.fastest) for each in slope]
     pairs = [[0.0, 1.0], *[slope] * bleeds, spring, *[knee, slope] * len(form.directions_with_knee)]
+    pairs += [square] * len(form.directions_with_square)
     return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
 

@@ -207,6 +207,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
         (
             *of_direction,
             _estimated("bleed_Ns_per_m", "bleed", "N s/m"),
+            _estimated("bleed_square_Ns2_per_m2", "square part of it", "N s2/m2", optional=True),
             _estimated("knee_force_N", "knee", "N"),
             _estimated("knee_velocity_m_per_s", "knee", "m/s"),
             _estimated("blow_off_Ns_per_m", "blow-off", "N s/m"),
@@ -276,8 +277,8 @@ def _force_at(place: int, speed: float) -> Column:
     )
 
 
-def _estimated(column: str, head: str, unit: str) -> Column:
-    return Column(column, head, unit, lambda each: each.estimate(column))
+def _estimated(column: str, head: str, unit: str, *, optional: bool = False) -> Column:
+    return Column(column, head, unit, lambda each: each.estimate(column), optional=optional)
 
 
 def _per_unit(column: str, head: str) -> Column:

@@ -82,7 +82,7 @@ def test_a_file_that_keeps_the_rules_declares_an_effect(effects: Effects) -> Non
     [
         (text("EFFECT =", "OTHER ="), "cubic.py: declares no EFFECT"),
         (text("def extra_slope", "def slope"), "cubic.py: extra_slope must stand beside extra_force"),
-        (text("w, q", "w, b"), "cubic.py: extra_force takes w, q .got b."),
+        (text("w, q", "w, b"), "cubic.py: extra_force takes w, side, q .got b."),
         (text(place="parallel"), "cubic.py: an effect of the parallel needs law"),
         (text(place="inside"), "cubic.py: there is no place inside"),
         (text('"q"', '"T0"').replace("w, q", "w, T0"), "cubic.py: parameter T0 has .* quantity.*model.py"),

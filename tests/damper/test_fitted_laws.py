@@ -43,7 +43,7 @@ def test_a_fitted_law_gives_its_reference_numbers(name: str) -> None:
     effect = fitted_laws()[name]
     laws = functions(effect, module_of(effect)).values()
     for given, expected in effect.tests:
-        (law,) = (law for law in laws if set(arguments(law)) == set(given))
+        law = next(law for law in laws if set(arguments(law)) == set(given))  # a force stands before its slope
         assert law(**given) == pytest.approx(expected, rel=1e-12)
 
 
@@ -55,6 +55,25 @@ def test_the_steady_force_is_bleed_up_to_the_knee_and_blow_off_beyond_it_in_each
     knee = (120.0 - 35.0) / (0.6 * 2000.0)
     compression = 35.0 + 1200.0 * np.minimum(speeds, knee) + 350.0 * np.maximum(speeds - knee, 0.0)
     np.testing.assert_allclose(steady_force(damper, None, None, -speeds), -compression, rtol=1e-12)
+
+
+def test_a_square_bleed_adds_the_square_of_the_flow_up_to_the_knee_of_its_direction() -> None:
+    squares = {**KNEE, "q_reb": 9000.0, "q_comp": 4000.0}
+    damper = PLAIN.with_effect("knee", squares)
+    np.testing.assert_allclose(
+        steady_force(damper, None, None, np.array([0.05, -0.04])),
+        [35.0 + 2800.0 * 0.05 + 9000.0 * 0.05**2, -(35.0 + 1200.0 * 0.04 + 4000.0 * 0.04**2)],
+        rtol=1e-12,
+    )
+    # The knee is a force: with the square part it is reached at a lower speed, and the blow-off goes on from there.
+    at = (-2800.0 + np.sqrt(2800.0**2 + 4.0 * 9000.0 * (250.0 - 35.0))) / (2.0 * 9000.0)
+    np.testing.assert_allclose(steady_force(damper, None, None, np.array([0.5])), 250.0 + 600.0 * (0.5 - at), rtol=1e-9)
+
+
+def test_a_square_bleed_alike_in_both_directions_is_an_orifice() -> None:
+    alike = {"beta": 0.0, "F_reb": NO_KNEE, "C_reb": 1.0, "F_comp": NO_KNEE, "C_comp": 1.0}
+    one = respond(PLAIN.with_effect("knee", {**alike, "q_reb": 3000.0, "q_comp": 3000.0}), motion())
+    np.testing.assert_array_equal(respond(PLAIN.with_effect("orifice_quadratic", {"q": 3000.0}), motion()), one)
 
 
 def test_a_damper_built_the_other_way_round_gives_the_mirrored_force_in_the_mirrored_motion() -> None:

@@ -208,6 +208,43 @@ def test_a_friction_at_its_limit_of_none_has_an_interval(rng: np.random.Generato
     assert 0.0 < knee.friction_N_high95 < 100.0  # a tenth of the force
 
 
+def needle_and_shims(motion: Motion) -> Array:
+    """A digressive race damper: a jet and shims beside each other, without an oil spring: no law of ours.
+
+    Equation: |v| = F / (c sqrt(F + F_l)) + max(F - F_o, 0) / C_o
+    """
+    force = np.geomspace(1e-3, 3e3, 4000)
+
+    def flow(c: float, opens: float, slope: float) -> Array:
+        speed = force / (c * np.sqrt(force + 5.0)) + np.maximum(force - opens, 0.0) / slope
+        return np.interp(np.abs(motion.velocity), speed, force)
+
+    v = motion.velocity
+    return np.where(v > 0.0, flow(350.0, 600.0, 1500.0), -flow(250.0, 320.0, 900.0)) + 35.0 * np.tanh(v / 1e-3)
+
+
+def test_a_bleed_through_a_jet_is_square_and_leaves_the_friction_to_the_seal(rng: np.random.Generator) -> None:
+    """A straight bleed is too large at low speed, and none of the friction is left to the seal (W_s 0.006)."""
+    (row,) = found(needle_and_shims, rng).knees.rows
+    assert row.W_s < 1e-4
+    assert row.rebound_bleed_square_Ns2_per_m2 == pytest.approx(350.0**2, rel=0.1)
+    assert row.compression_bleed_square_Ns2_per_m2 == pytest.approx(250.0**2, rel=0.1)
+    assert row.rebound_knee_force_N == pytest.approx(635.0, rel=0.03)
+    assert row.compression_knee_force_N == pytest.approx(355.0, rel=0.03)
+    assert row.friction_N == pytest.approx(35.0, abs=5.0)
+
+
+def test_straight_bleeds_have_no_square_part(with_a_knee: Identified) -> None:
+    (row,) = with_a_knee.knees.rows
+    assert row.rebound_bleed_square_Ns2_per_m2 is row.compression_bleed_square_Ns2_per_m2 is None
+
+
+def test_a_damper_written_before_bleeds_had_a_square_part_is_read() -> None:
+    """Its bleeds are straight."""
+    now = {**TRUTH.effects["knee"], "q_reb": 0.0, "q_comp": 0.0}
+    np.testing.assert_array_equal(of(TRUTH)(swing(2.0, 0.02)), of(TRUTH.with_effect("knee", now))(swing(2.0, 0.02)))
+
+
 def test_a_knee_in_one_direction_alone_is_found_in_that_direction_alone(rng: np.random.Generator) -> None:
     values = {**TRUTH.effects["knee"], "F_comp": 1e7, "C_comp": 1400.0}
     (row,) = found(of(TRUTH.with_effect("knee", values)), rng).knees.rows

@@ -57,14 +57,15 @@ def _takes(effect: Effect, name: str) -> tuple[str, ...]:
     return arguments(functions(effect, module_of(effect))[name])
 
 
-def _on(effect: Effect) -> str:
-    """Return the condition under which an effect acts: one of its parameters is not neutral."""
-    return " or ".join(f"{_place((effect.name, p.name))} != {p.neutral!r}" for p in effect.parameters)
+def _on(effect: Effect, law: str | None = None) -> str:
+    """Return the condition under which an effect acts, or one law of it: a parameter that it takes is not neutral."""
+    taken = [p for p in effect.parameters if law is None or p.name in _takes(effect, law)]
+    return " or ".join(f"{_place((effect.name, p.name))} != {p.neutral!r}" for p in taken)
 
 
-def _none_on(effects: Sequence[Effect]) -> str:
-    """Return the condition under which none of some effects acts."""
-    return " and ".join(f"not ({_on(effect)})" for effect in effects) or "True"
+def _none_on(effects: Sequence[Effect], law: str | None = None) -> str:
+    """Return the condition under which none of some effects acts, or one law of theirs."""
+    return " and ".join(f"not ({_on(effect, law)})" for effect in effects) or "True"
 
 
 def _function(head: str, *lines: str) -> list[str]:
@@ -72,9 +73,9 @@ def _function(head: str, *lines: str) -> list[str]:
     return ["@compiled", f"def {head}:", *(f"    {line}" for line in lines)]
 
 
-def _guarded(effect: Effect, *lines: str) -> list[str]:
-    """Return lines that run only where an effect acts."""
-    return [f"if {_on(effect)}:", *(f"    {line}" for line in lines)]
+def _guarded(effect: Effect, *lines: str, law: str | None = None) -> list[str]:
+    """Return lines that run only where an effect acts, or one law of it."""
+    return [f"if {_on(effect, law)}:", *(f"    {line}" for line in lines)]
 
 
 def _tuple(entry: str) -> str:
@@ -184,17 +185,18 @@ def _viscous(effects: Sequence[Effect]) -> Iterator[str]:
 
 
 def _extra(effects: Sequence[Effect]) -> Iterator[str]:
-    """Yield the extra force, a sum."""
-    force = [line for e in effects for line in _guarded(e, f"force += {_call(e, 'extra_force', w='w')}")]
-    slope = [line for e in effects for line in _guarded(e, f"slope += {_call(e, 'extra_slope', w='w')}")]
-    closed = []
+    """Yield the extra force, a sum; an effect that does more to the curve may add none."""
+    law, force, slope, closed = "extra_force", list[str](), list[str](), list[str]()
+    for effect in effects:
+        force += _guarded(effect, f"force += {_call(effect, law, w='w', side='side')}", law=law)
+        slope += _guarded(effect, f"slope += {_call(effect, 'extra_slope', w='w', side='side')}", law=law)
     for effect in _has(effects, "extra_speed"):
-        others = _none_on([other for other in effects if other is not effect])
-        closed += [f"if {others}:", f"    return {_call(effect, 'extra_speed', force='force', C='C')}"]
-    yield from _function("extra_force(w, p)", "force = 0.0", *force, "return force")
-    yield from _function("extra_slope(w, p)", "slope = 0.0", *slope, "return slope")
-    yield from _function("extra_speed(force, C, p)", *closed, "return -1.0")
-    yield from _function("extra_none(p)", f"return {_none_on(effects)}")
+        others = _none_on([other for other in effects if other is not effect], law)
+        closed += [f"if {others}:", f"    return {_call(effect, 'extra_speed', force='force', C='C', side='side')}"]
+    yield from _function("extra_force(w, side, p)", "force = 0.0", *force, "return force")
+    yield from _function("extra_slope(w, side, p)", "slope = 0.0", *slope, "return slope")
+    yield from _function("extra_speed(force, C, side, p)", *closed, "return -1.0")
+    yield from _function("extra_none(p)", f"return {_none_on(effects, law)}")
 
 
 def _parallel() -> Iterator[str]:
@@ -332,11 +334,11 @@ viscous_speed: Callable[[float, float, Row], float] = _MODULE.viscous_speed
 """Flow speed [m/s] at a viscous force [N] and C [N s/m]."""
 viscous_straight: Callable[[Row], bool] = _MODULE.viscous_straight
 """Whether the viscous force is C w."""
-extra_force: Callable[[float, Row], float] = _MODULE.extra_force
-"""Force added to friction and viscous force [N] at a flow speed [m/s]."""
-extra_slope: Callable[[float, Row], float] = _MODULE.extra_slope
+extra_force: Callable[[float, float, Row], float] = _MODULE.extra_force
+"""Force added to friction and viscous force [N] at a flow speed [m/s] and side."""
+extra_slope: Callable[[float, float, Row], float] = _MODULE.extra_slope
 """Derivative of `extra_force` by the speed [N s/m]."""
-extra_speed: Callable[[float, float, Row], float] = _MODULE.extra_speed
+extra_speed: Callable[[float, float, float, Row], float] = _MODULE.extra_speed
 """Flow speed [m/s] at which C w and the extra force together take a force [N]; -1 where there is no closed form."""
 extra_none: Callable[[Row], bool] = _MODULE.extra_none
 """Whether there is no extra force."""

@@ -1,33 +1,42 @@
 """Passive road and race damper: bleed, knee and blow-off, each of its own in rebound and in compression.
 
-Law: the flow curve is T0 + C (1 + beta) w in rebound and T0 + C (1 - beta) w in compression (bleed) up to the force of
-the knee; from there on it has the slope of the blow-off. Range: knees at 0.05 to 0.3 m/s; the bleed is two to ten times
-as steep as the blow-off where shims open, and flatter where a port chokes.
+Law: the flow curve is T0 + C (1 + beta) w + q_reb w^2 in rebound and T0 + C (1 - beta) w + q_comp w^2 in compression
+(bleed) up to the force of the knee; from there on it has the slope of the blow-off. Range: knees at 0.05 to 0.3 m/s;
+the bleed is two to ten times as steep as the blow-off where shims open, and flatter where a port chokes; through a jet
+or a needle it is all but square, through a slot or the notch of a shim all but straight.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 from pzd.damper.effect import Effect, Parameter, Search
 
 NO_KNEE = 1.0e7
 """Knee force of a direction without a knee [N]: no damper reaches it."""
 
+STEEPEST = 1.0 - 1e-6
+"""Largest share: the straight part of a bleed that is all but square is next to nothing beside the other's."""
+
 _SHARE = Search(lambda _: 1.0, (0.0,))
 _FORCES = Search(lambda s: s.force, (0.3,), logarithmic=True)
 _SLOPES = Search(lambda s: s.damping, (0.4,), logarithmic=True)
+_SQUARES = Search(lambda s: s.force / s.speed**2, (0.05,))
 
 EFFECT = Effect(
     name="knee",
     place="flow",
-    law="C times (1 + beta sign(F)); beyond max(F_reb or F_comp, T0) the slope is C_reb or C_comp",
+    law="C times (1 + beta sign(F)), + (q_reb or q_comp) w^2; beyond max(F_reb or F_comp, T0) slope C_reb or C_comp",
     parameters=(
-        Parameter("beta", "-", 0.0, -0.999, 0.999, "share by which the bleed of rebound is steeper", _SHARE),
+        Parameter("beta", "-", 0.0, -STEEPEST, STEEPEST, "share by which the bleed of rebound is steeper", _SHARE),
         Parameter("F_reb", "N", inf, 0.0, NO_KNEE, "force of the knee in rebound", _FORCES),
         Parameter("C_reb", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in rebound", _SLOPES),
         Parameter("F_comp", "N", inf, 0.0, NO_KNEE, "force of the knee in compression", _FORCES),
         Parameter("C_comp", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in compression", _SLOPES),
+        Parameter("q_reb", "N s2/m2", 0.0, 0.0, 1.0e8, "square part of the bleed in rebound", _SQUARES, optional=True),
+        Parameter(
+            "q_comp", "N s2/m2", 0.0, 0.0, 1.0e8, "square part of the bleed in compression", _SQUARES, optional=True
+        ),
     ),
     source="bleed and blow-off stages of a shimmed piston; Dixon 2007, The Shock Absorber Handbook",
     tests=(
@@ -36,6 +45,8 @@ EFFECT = Effect(
         ({"T0": 40.0, "side": 1.0, "F_reb": 300.0, "F_comp": 120.0}, 300.0),
         ({"T0": 40.0, "side": -1.0, "F_reb": 300.0, "F_comp": 20.0}, 40.0),
         ({"side": -1.0, "C_reb": 900.0, "C_comp": 500.0}, 500.0),
+        ({"w": 0.1, "side": 1.0, "q_reb": 6000.0, "q_comp": 2000.0}, 60.0),
+        ({"w": 0.1, "side": -1.0, "q_reb": 6000.0, "q_comp": 2000.0}, 20.0),
     ),
 )
 
@@ -53,3 +64,18 @@ def opens_at(T0: float, side: float, F_reb: float, F_comp: float) -> float:
 def slope_beyond(side: float, C_reb: float, C_comp: float) -> float:
     """Slope [N s/m] beyond it."""
     return C_reb if side > 0.0 else C_comp
+
+
+def extra_force(w: float, side: float, q_reb: float, q_comp: float) -> float:
+    """Force [N] of the square part of the bleed at a flow speed w >= 0 [m/s]."""
+    return (q_reb if side > 0.0 else q_comp) * w * w
+
+
+def extra_slope(w: float, side: float, q_reb: float, q_comp: float) -> float:
+    """Compute its derivative by w [N s/m]."""
+    return 2.0 * (q_reb if side > 0.0 else q_comp) * w
+
+
+def extra_speed(force: float, C: float, side: float, q_reb: float, q_comp: float) -> float:
+    """Flow speed w [m/s] at which C w and the square part together take a force >= 0 [N]."""
+    return 2.0 * force / (C + sqrt(C * C + 4.0 * (q_reb if side > 0.0 else q_comp) * force))

@@ -170,6 +170,9 @@ class FirstState:
             else:
                 self._move_effect(effects, c, x)
         base = tuple(rows[id(row)] for row in self.damper.base)
+        if "knee" in effects:
+            more = [float(np.mean([rows[id(row)].T0_N - row.T0_N for row in group])) for _, group in groups]
+            effects["knee"] = lifted(effects["knee"], more)
         damper = self.damper.model_copy(update={"base": base, "effects": effects})
         if not placed:
             return damper
@@ -245,6 +248,28 @@ def values_by_control(c: Coordinate, before: Sequence[float], x: float) -> tuple
     return tuple(float(np.clip(v, parameter.low, parameter.high)) for v in moved)
 
 
+KNEE_FORCES = ("F_reb", "F_comp")
+BLEED = ("beta", "q_reb", "q_comp")
+"""Numbers of the knee law that make its bleed, beside C."""
+
+
+def lifted(
+    knee: Mapping[str, float | tuple[float, ...]], friction: Sequence[float]
+) -> dict[str, float | tuple[float, ...]]:
+    """Return the numbers of the knee law where a seal rubs by so much more at each control signal [N].
+
+    It rubs beside the oil at every speed, and the force of the knee holds it.
+    """
+    values = dict(knee)
+    for name in KNEE_FORCES:
+        force = values[name]
+        if isinstance(force, tuple):
+            values[name] = tuple(max(f + more, 0.0) for f, more in zip(force, friction, strict=True))
+        else:
+            values[name] = max(force + float(np.mean(friction)), 0.0)
+    return values
+
+
 # --- The candidates
 
 
@@ -263,7 +288,7 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
             continue
         found += _present(first, name) if present else [_absent(first, name)]
         if present and name in fitted_laws():
-            found.append(_whole_law(found))
+            found += [_with_damping(found, of_bleed=each) for each in (True, False)]
     return [candidate for candidate in found if all(c.low < c.high for c in candidate.coordinates)]
 
 
@@ -346,13 +371,16 @@ def _absent(first: FirstState, name: str) -> Candidate:
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
 
 
-def _whole_law(found: Sequence[Candidate]) -> Candidate:
-    """Return C and every number of the law that goes on where it ends: a thinner oil changes them all.
+def _with_damping(found: Sequence[Candidate], *, of_bleed: bool) -> Candidate:
+    """Return C and the numbers of the law that goes on where it ends, or those alone that say more of the bleed.
 
-    Neither explains by itself what both did: the tests then seem to differ in their gains.
+    A needle that is opened changes the whole bleed, a thinner oil all of the law. Neither part explains by itself what
+    both did: the tests then seem to differ in their gains.
     """
-    damping, law = next(c for c in found if c.name == "C"), found[-1]
-    coordinates = (*damping.coordinates, *law.coordinates)
+    damping = next(c for c in found if c.name == "C")
+    law = max((c for c in found if c.name in fitted_laws()), key=lambda c: len(c.coordinates))
+    more = [c for c in law.coordinates if not of_bleed or c.parameter in BLEED]
+    coordinates = (*damping.coordinates, *more)
     return replace(law, coordinates=coordinates, starts=((0.0,) * len(coordinates),))
 
 
@@ -374,9 +402,11 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
     One that differs by control signal may change in proportion or, as a size of force, by as much at all: what is newly
     there beside what the first state has adds to it.
     """
-    own, coordinates, added = first.damper.effects[name], [], []
+    own, coordinates, added, without = first.damper.effects[name], [], [], []
     for p in known_effect(name).parameters:
-        value = own[p.name]
+        value = own.get(p.name, p.neutral)
+        if p.optional and not np.any(value):
+            without.append(p.name)
         if isinstance(value, tuple):
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, 20.0))
             if not p.search.logarithmic:
@@ -393,7 +423,9 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, value))
     flexible = _flexible(name)
     single = [Candidate(name, "damper", (c,), _starts(c), flexible=flexible) for c in (*coordinates, *added)]
-    together = Candidate(name, "damper", tuple(coordinates), ((0.0,) * len(coordinates),), flexible=flexible)
+    # A part of the law that the first state has not is asked for alone.
+    there = tuple(c for c in coordinates if c.parameter not in without)
+    together = Candidate(name, "damper", there, ((0.0,) * len(there),), flexible=flexible)
     return [*single, together] if len(coordinates) > 1 else single
 
 

@@ -2,9 +2,10 @@
 
 The covariance of a stacked difference has three parts: noise from the cycles; offset, gain and delay that any test has
 of its own, a share of the priors of `NuisanceConfig`; and what no candidate explains, a share of the difference in
-every octave. Both shares are estimated with the changes, so that a difference without a name is not given one.
+every octave, and of its mean for moments of the cycle. The shares are estimated with the changes, so that a difference
+without a name is not given one.
 
-Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s) + u^2 A A'
+Equation: -2 ln L = sum_t r' V^-1 r + ln det V, V = diag(v + g^2 s + m^2 d) + u^2 A A'
                                                     Source: Gaussian likelihood; A of `pzd.signals.nuisance`
 """
 
@@ -33,10 +34,18 @@ SHARES = (0.1, 0.17, 0.3, 0.5, 0.75, 1.0)
 """Shares that are tried."""
 DISCREPANCIES = (0.0, *(float(x) for x in np.geomspace(3e-3, 1.5, 20)))
 """Shares of the difference without a name that are tried, from nothing to all of it."""
+MOMENTS = (0.0, *(float(x) for x in np.geomspace(0.01, 0.6, 10)))
+"""Shares of the difference without a name for moments alone that are tried.
+
+Reason: a law that turns sharply where the damper does so smoothly is off for a moment of the cycle, which is white over
+the harmonics, and at the high ones as large as the difference; without it all of the difference would count as little
+known as these."""
 LEAST_VARIANCE = 1e-10
 """Variance of every number besides, as a share of the squared peak force: 1e-5 of it, the error of a simulation."""
 MUCH_OF_TESTS = 0.5
 """Share of the prior that the tests have each of their own from which a fit is begun with little of it too."""
+MUCH_WITHOUT_NAME = 0.15
+"""Share of the difference without a name from which a fit is begun with all but none of it too."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
@@ -55,6 +64,12 @@ class Scatter:
     """u: of the priors on offset, gain and delay."""
     discrepancy: float
     """g: of the difference, what no candidate explains."""
+    moment: float = 0.0
+    """m: of the difference, what no candidate explains for moments alone, as where the rod turns round."""
+
+
+ALL_BUT_KNOWN = Scatter(SHARES[0], DISCREPANCIES[1], 0.15)
+"""Scatter of a law that explains the difference but where the rod turns round."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +103,23 @@ class Likelihood:
             found.append(tests * np.column_stack([offset, self.nuisance.gain * stacked(c.reference), late]))
         return tuple(found)
 
-    def diagonal(self, at: int, scatter: Scatter) -> Array:
-        """Return (2 H + 1,) variance of one comparison by noise and discrepancy [N^2]."""
-        c = self.comparisons[at]
-        missed = (scatter.discrepancy**2 + self.known_discrepancy**2) * self._shapes[at]
+    @cached_property
+    def _floors(self) -> tuple[Array, ...]:
+        """(2 H + 1,) variance of every comparison whatever has no name [N^2]."""
         # A damper misses the same in all tests that it stands for, so that their number does not average it out.
         alike = sum(each.before is None for each in self.comparisons)
-        return np.asarray(c.variance + missed + alike * self.missed_by_model(at) + LEAST_VARIANCE * c.peak**2)
+        return tuple(
+            c.variance + self.known_discrepancy**2 * self._shapes[i] + alike * self.missed_by_model(i)
+            + LEAST_VARIANCE * c.peak**2
+            for i, c in enumerate(self.comparisons)
+        )  # fmt: skip
+
+    def diagonals(self, at: int, scatters: Sequence[Scatter]) -> Array:
+        """Return (s, 2 H + 1) variance of one comparison by noise and discrepancy [N^2]."""
+        difference = self.comparisons[at].difference
+        squares = np.array([(scatter.discrepancy**2, scatter.moment**2) for scatter in scatters])
+        even = np.full(difference.size, difference @ difference / difference.size)
+        return np.asarray(self._floors[at] + squares @ np.stack([self._shapes[at], even]))
 
     def missed_by_model(self, at: int) -> Array:
         """Return (2 H + 1,) mean square that the damper of the first state misses where it stands for a test [N^2]."""
@@ -109,7 +134,7 @@ class Likelihood:
         columns, own = [], []
         for i, (r, A) in enumerate(zip(residuals, self.columns, strict=True)):
             U = np.column_stack([scatter.tests * A, self.comparisons[i].jumps])
-            weighed = U / self.diagonal(i, scatter)[:, None]
+            weighed = U / self.diagonals(i, [scatter])[0][:, None]
             columns.append(U)
             own.append(np.linalg.solve(np.eye(U.shape[1]) + U.T @ weighed, weighed.T @ r))
         of_test = self.columns[0].shape[1]
@@ -136,7 +161,7 @@ class Likelihood:
         total = (np.log(tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
         for i, (r, A, products) in enumerate(zip(residuals, self.columns, self._products, strict=True)):
             U = np.hstack([A, self.comparisons[i].jumps])
-            D = np.stack([self.diagonal(i, scatter) for scatter in scatters])
+            D = self.diagonals(i, scatters)
             size = np.ones((tests.size, U.shape[1]))
             size[:, : A.shape[1]] = tests[:, None]
             inner = np.tensordot(1.0 / D, products, 1) * size[:, :, None] * size[:, None, :] + np.eye(U.shape[1])
@@ -149,7 +174,8 @@ class Likelihood:
         """Return the likeliest scatter of some residuals on a grid, and -2 ln L there."""
         best, least = Scatter(USUAL_SHARE, 0.0), np.inf
         for _ in range(2):  # one after the other: they are all but independent
-            for tried in ([Scatter(best.tests, g) for g in DISCREPANCIES], [replace(best, tests=u) for u in SHARES]):
+            without_name = [Scatter(best.tests, g, m) for g in DISCREPANCIES for m in MOMENTS]
+            for tried in (without_name, [replace(best, tests=u) for u in SHARES]):
                 found = self.deviances(residuals, tried)
                 if np.min(found) < least:
                     least = float(np.min(found))
@@ -161,7 +187,7 @@ class Likelihood:
         found = []
         for i, A in enumerate(self.columns):
             J = self.comparisons[i].jumps
-            V = np.diag(self.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T + J @ J.T
+            V = np.diag(self.diagonals(i, [scatter])[0]) + scatter.tests**2 * A @ A.T + J @ J.T
             found.append(np.linalg.inv(np.linalg.cholesky(V)))
         return found
 
@@ -243,11 +269,14 @@ class Regression:
         """
         candidates = tuple(candidates)
         found = self._fitted(candidates, start, scatter)
-        if not candidates or found.scatter.tests < MUCH_OF_TESTS:
+        if not candidates:
             return found
-        # What the tests are taken to have each of their own may be the change, which then has nothing to explain.
-        other = self._fitted(candidates, start, replace(scatter, tests=SHARES[0]))
-        return min(found, other, key=lambda each: each.bic)
+        # What the tests are taken to have each of their own, or to have no name, may be the change, which then has
+        # nothing to explain.
+        others = [replace(scatter, tests=SHARES[0])] if found.scatter.tests >= MUCH_OF_TESTS else []
+        others += [ALL_BUT_KNOWN] if found.scatter.discrepancy >= MUCH_WITHOUT_NAME else []
+        ends = [found, *(self._fitted(candidates, start, each) for each in others)]
+        return min(ends, key=lambda each: each.bic)
 
     def _fitted(self, candidates: tuple[Candidate, ...], start: Array, scatter: Scatter) -> Fitted:
         """Fit by least squares and estimate the scatter in turn: the optimum is that near the scatter begun with."""

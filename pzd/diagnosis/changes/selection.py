@@ -13,9 +13,11 @@ from itertools import combinations
 import numpy as np
 
 from pzd.damper.confounders import known
-from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes
+from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes, without_laws
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
+from pzd.diagnosis.search.acceptance import misplaced_end_stop
+from pzd.diagnosis.search.determination import nearly_others
 from pzd.fit.cross_validation import SMALLEST_SINGULAR, folds_in_turn, held_out_residuals
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
@@ -415,7 +417,16 @@ class Search:
             return False
         if not first.is_natural(fitted.coordinates, fitted.values.tolist()) or self.size_of(fitted, new) < least:
             return False
+        if new.absent and new.name == "end_stop" and self._misplaced(fitted):
+            return False
         return at_limit or self._each_number_shows(fitted)
+
+    def _misplaced(self, fitted: Fitted) -> bool:
+        """Whether an end stop that is newly there begins where none does."""
+        damper = self.regression.response.first.changed(fitted.coordinates, fitted.values.tolist(), None)
+        motions = [(c.motion.displacement, c.motion.velocity) for c in self.regression.comparisons]
+        stroke = max(float(np.ptp(x)) for x, _ in motions) / 2.0
+        return misplaced_end_stop(damper, stroke, motions) is not None
 
     def _each_number_shows(self, fitted: Fitted) -> bool:
         """Whether each number of the last change of a fit moves the force."""
@@ -514,11 +525,20 @@ class Search:
         worth = [p for i, p in enumerate(promising) if i < FITTED or (p.criterion < limit and i < 2 * FITTED)]
         fits = [self._with(less, p) for p in worth]
         fits += self._grouped(best, candidate)
-        near = [f for f in fits if self._is_rival(f, best, less) and self._leaves_less(f, less)]
+        alike = self._nearly(best, candidate)
+        near = [f for f in fits if f.candidates[-1].name == alike or self._is_rival(f, best, less)]
+        near = [f for f in near if self._leaves_less(f, less)]
         # A C that is smaller at one value of the control signal alone may be a valve that opens just above the yield.
         limit = candidate.per_voltage
         found = [fitted for fitted in near if self._admissible(fitted, self._possible(fitted), at_limit=limit)]
         return found or [f for f in fits if self._is_gain(f, best, candidate)]
+
+    def _nearly(self, best: Fitted, candidate: Candidate) -> str | None:
+        """Return the effect that many would call one that is newly there with such values; None for no other."""
+        if not candidate.absent:
+            return None
+        damper = self.regression.response.first.changed(best.coordinates, best.values.tolist(), None)
+        return nearly_others(without_laws(damper), max(self._peaks)).get(candidate.name)
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or it leaves no more than the model misses.

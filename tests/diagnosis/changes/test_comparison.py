@@ -273,13 +273,13 @@ def test_the_scatter_is_as_likely_by_determinant_and_inverse_of_the_covariance(r
     """-2 ln L of a normal density, its matrix written out."""
     damper = drawn_damper(rng)
     likelihood = likelihood_between(campaign(damper, rng), campaign(damper, rng))
-    scatters = [Scatter(0.3, 0.0), Scatter(1.0, 0.2)]
+    scatters = [Scatter(0.3, 0.0), Scatter(1.0, 0.2), Scatter(0.5, 0.1, 0.15)]
     residuals = [rng.standard_normal(c.difference.size) for c in likelihood.comparisons]
     for scatter, found_here in zip(scatters, likelihood.deviances(residuals, scatters), strict=True):
         direct = (np.log(scatter.tests / USUAL_SHARE) / SHARE_SCATTER) ** 2
         for i, (r, A) in enumerate(zip(residuals, likelihood.columns, strict=True)):
             J = likelihood.comparisons[i].jumps
-            V = np.diag(likelihood.diagonal(i, scatter)) + scatter.tests**2 * A @ A.T + J @ J.T
+            V = np.diag(likelihood.diagonals(i, [scatter])[0]) + scatter.tests**2 * A @ A.T + J @ J.T
             direct += r @ np.linalg.solve(V, r) + np.linalg.slogdet(V)[1]
         assert found_here == pytest.approx(direct, rel=1e-7)
 
@@ -485,7 +485,8 @@ def test_of_a_law_in_which_one_side_changed_the_other_side_is_as_it_was(rng: np.
     before, after = (campaign(Damper(base=(row,), effects={"knee": own}), rng, WIDE) for own in (law, shim))
     changes = found(before, after, IdentifyConfig(law="knee"))
     assert {(c.name, c.parameter) for c in changes.changes} == {("knee", "F_comp"), ("knee", "C_comp")}
-    assert {each.parameter for each in changes.unchanged if each.name == "knee"} == {"beta", "F_reb", "C_reb"}
+    still = {each.parameter for each in changes.unchanged if each.name == "knee"}
+    assert still == {"beta", "F_reb", "C_reb", "q_reb", "q_comp"}
 
 
 def test_a_gas_that_grew_is_told_with_the_gas_that_was_there(rng: np.random.Generator) -> None:
@@ -512,3 +513,37 @@ def test_what_may_be_as_it_was_is_said_to_be_open() -> None:
     assert _may_be_as_before([change("C", 80.0), change("T0", 101.0)]) == ["C"]
     law = [change("second_branch", 80.0, "T0_2"), change("second_branch", 101.0, "k_2")]
     assert _may_be_as_before(law) == []
+
+
+JET = {"beta": 0.2, "F_reb": 640.0, "C_reb": 1400.0, "F_comp": 360.0, "C_comp": 840.0, "q_reb": 1.1e5, "q_comp": 5e4}
+"""Knees behind bleeds through a jet."""
+
+
+def test_a_needle_that_was_opened_changes_the_bleed_and_leaves_knees_and_seal(rng: np.random.Generator) -> None:
+    row = BaseRow(T0_N=35.0, C_Ns_per_m=1000.0, k_N_per_m=1.5e6)
+    opened = {**JET, "q_reb": JET["q_reb"] / 1.3**2, "q_comp": JET["q_comp"] / 1.3**2}
+    before, after = (campaign(Damper(base=(row,), effects={"knee": own}), rng, WIDE) for own in (JET, opened))
+    changes = found(before, after, IdentifyConfig(law="knee"))
+    assert changes.verdict == "changed"
+    assert {(c.name, c.parameter) for c in changes.changes} == {("knee", "q_reb"), ("knee", "q_comp")}
+    assert all(change.to == pytest.approx(change.from_ / 1.3**2, rel=0.05) for change in changes.changes)
+    assert {"T0", "F_reb", "C_reb", "F_comp", "C_comp"} <= {each.parameter for each in changes.unchanged}
+
+
+@pytest.mark.parametrize("rubs", [16.0, 60.0])
+def test_a_seal_that_rubs_less_or_more_changes_t0_and_the_knees_only_by_as_much(
+    rubs: float, rng: np.random.Generator
+) -> None:
+    """It rubs beside the oil at every speed; a T0 that left the force of the knee as it was would end there."""
+    row = BaseRow(T0_N=35.0, C_Ns_per_m=2200.0, k_N_per_m=3.8e6)
+    law = {"beta": 0.33, "F_reb": 500.0, "C_reb": 800.0, "F_comp": 350.0, "C_comp": 450.0}
+    lifted = {**law, "F_reb": 500.0 + rubs - 35.0, "F_comp": 350.0 + rubs - 35.0}
+    new = row.model_copy(update={"T0_N": rubs})
+    before = campaign(Damper(base=(row,), effects={"knee": law}), rng, WIDE)
+    changes = found(
+        before, campaign(Damper(base=(new,), effects={"knee": lifted}), rng, WIDE), IdentifyConfig(law="knee")
+    )
+    assert changes.verdict == "changed"
+    (change,) = changes.changes
+    assert change.name == "T0"
+    assert change.to == pytest.approx(rubs, abs=3.0)
