@@ -273,10 +273,23 @@ class Regression:
             return found
         # What the tests are taken to have each of their own, or to have no name, may be the change, which then has
         # nothing to explain.
-        others = [replace(scatter, tests=SHARES[0])] if found.scatter.tests >= MUCH_OF_TESTS else []
-        others += [ALL_BUT_KNOWN] if found.scatter.discrepancy >= MUCH_WITHOUT_NAME else []
-        ends = [found, *(self._fitted(candidates, start, each) for each in others)]
+        ends = [found]
+        if found.scatter.tests >= MUCH_OF_TESTS:
+            ends.append(self._fitted(candidates, start, replace(scatter, tests=SHARES[0])))
+        if found.scatter.discrepancy >= MUCH_WITHOUT_NAME:
+            nearer = self._stepped(found, ALL_BUT_KNOWN)
+            if nearer.bic < found.bic:
+                ends.append(self._fitted(candidates, nearer.values, nearer.scatter))
         return min(ends, key=lambda each: each.bic)
+
+    def _stepped(self, found: Fitted, scatter: Scatter) -> Fitted:
+        """Return a fit after one linear step with another scatter."""
+        coordinates = found.coordinates
+        whiteners = self.likelihood.whiteners(scatter)
+        r = np.concatenate([W @ each for W, each in zip(whiteners, found.residuals, strict=True)])
+        step = np.linalg.lstsq(self.jacobian(coordinates, found.values, whiteners), r, rcond=STEP)[0]
+        limits = [c.low for c in coordinates], [c.high for c in coordinates]
+        return self._described(found.candidates, np.clip(found.values + step, *limits))
 
     def _fitted(self, candidates: tuple[Candidate, ...], start: Array, scatter: Scatter) -> Fitted:
         """Fit by least squares and estimate the scatter in turn: the optimum is that near the scatter begun with."""
@@ -304,6 +317,11 @@ class Regression:
                 if new == scatter:
                     break
                 scatter = new
+        return self._described(candidates, x)
+
+    def _described(self, candidates: tuple[Candidate, ...], x: Array) -> Fitted:
+        """Return what (p,) values of the coordinates leave, with its scatter and criterion."""
+        coordinates = coordinates_of(candidates)
         made, residuals = self._left(coordinates, x)
         scatter, deviance = self.likelihood.best_scatter(residuals)
         penalty = len(coordinates) * float(np.log(self.likelihood.size))
