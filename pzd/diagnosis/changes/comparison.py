@@ -209,7 +209,7 @@ class Findings:
         if rivals:
             verdict = "ambiguous"
         told = list(dict.fromkeys(name for names in others.values() for name in names))
-        much = self._left_share(difference) > self.diagnose.unexplained_share
+        much = self._left_share(difference) > self.diagnose.unexplained_share and self._may_be_seen(difference)
         if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
             doubtful = {c.name for c in best.candidates if c.name in rivals or not self._stands_out(best, c)}
@@ -294,6 +294,14 @@ class Findings:
         if any(c.before is None for c in self.comparisons):
             return True
         return _beyond_noise(self.difference(best)) >= self.diagnose.visible * self.first.force
+
+    def _may_be_seen(self, difference: Difference) -> bool:
+        """Whether what is left may be seen: where the model stands for every test, a visible share of the peak.
+
+        It is the same of a difference that is hardly visible itself, which the error of the model makes up.
+        """
+        beyond = _beyond_noise(difference) >= self.diagnose.visible * self.first.force
+        return beyond or any(c.before is not None for c in self.comparisons)
 
     def _left_out_differs(self) -> str | None:
         """Say by how much worse the first damper predicts the tests that are not compared; None where it does not.
