@@ -33,6 +33,7 @@ from pzd.diagnosis.changes.pairs import (
     averaged,
     course,
     has_average_cycle,
+    stacked,
     unstacked,
 )
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
@@ -79,6 +80,13 @@ ONE_CONDITION = 2.0
 """Times what is visible that has to be left at one condition alone: its few tests differ by more than all together."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
+SAME_RECORDING = 1e-9
+"""Difference of force, as a share of the peak, of a recording from itself: the rounding of the averages."""
+EXCHANGED_LEAVES = 0.3
+"""Share (r.m.s.) that is left of a difference which comes of rebound and compression being exchanged.
+
+Reason: a tenth of it as a mean square; a damper that changed otherwise differs as much from its mirror image. Not
+tuned."""
 ZERO_SHARE = 0.01
 """Shift of the mean displacement that is reported, as a share of the half stroke: an actuator centres so well."""
 
@@ -766,6 +774,7 @@ class Findings:
         """Say how the tests were compared, and which are left out or go where no test of the first state came."""
         pairs = sum(c.before is not None for c in self.comparisons)
         told = [f"{counted(pairs, 'test')} compared cycle by cycle, {len(self.comparisons) - pairs} through the model"]
+        told += self._misread()
         if farther := self._stroke_beyond():
             told.append(farther)
         told.extend(
@@ -780,6 +789,31 @@ class Findings:
                 "control signal or temperature"
             )
         return told
+
+    def _misread(self) -> list[str]:
+        """Say where both states are the same recordings, or the second is the first with its two directions exchanged.
+
+        Equation: F_h -> - (-1)^h F_h, what both signs turned make of a motion that is the same to either side
+        """
+        pairs = [c for c in self.comparisons if c.before is not None]
+        apart = sum(float(c.difference @ c.difference) for c in pairs)
+        if pairs and apart <= SAME_RECORDING**2 * sum(c.peak**2 for c in pairs):
+            return [
+                f"the tests of {self.after.name} are those of {self.before.name} once more: nothing else was measured"
+            ]
+        exchanged = 0.0
+        for c in pairs:
+            sides = np.where(np.arange(c.measured.size) % 2, 1.0, -1.0)
+            left = stacked(sides * c.measured - c.reference)
+            exchanged += float(left @ left)
+        if not pairs or exchanged > EXCHANGED_LEAVES**2 * apart:
+            return []
+        size, rest = (_digits(float(np.sqrt(each / len(pairs)))) for each in (apart, exchanged))
+        told = (
+            f"with rebound and compression of {self.after.name} exchanged {rest} N of the {size} N are left: are the "
+        )
+        told += "signs of its files those of the others (`sign` in rig.files), or was the valve turned round?"
+        return [told]
 
     def cycles(self) -> tuple[ComparedCycle, ...]:
         """Return the compared cycles over their phase, with the difference that the changes make."""
