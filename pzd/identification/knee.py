@@ -18,7 +18,6 @@ from pzd.damper.compose import static_force, steady_force
 from pzd.fit.cross_validation import (
     FEWEST_TESTS,
     PredictionError,
-    folds_in_turn,
     log_ratios,
     squared_sums,
     standard_error,
@@ -29,12 +28,11 @@ from pzd.identification.intervals import half_widths, interval_columns, label_co
 from pzd.identification.knee_fit import (
     GAS_FORCE,
     GAS_SPRING,
-    REFIT_EVALUATIONS,
     KneeData,
     KneeFit,
-    descend,
     fit_bingham,
     fit_knee,
+    held_out,
     without_gas,
 )
 from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
@@ -326,35 +324,22 @@ HeldOutLaws = tuple[PredictedRow, tuple[float, ...], tuple[float, ...]]
 def held_out_predictions(labels: Labels, tests: KneeData, knee: KneeFit, bingham: KneeFit) -> list[HeldOutLaws]:
     """Predict every test of a condition by both laws, each fitted without it; none where the test is alone.
 
-    The tests are dealt into folds in the order of their speeds: both laws are functions of the speed, and every fold
-    leaves slow and fast ones to fit.
-
     Parameters
     ----------
     labels : of the condition
     tests : of the condition
     knee, bingham : the optima over all tests, at which the refits start
     """
-    count = len(tests.tests)
-    if count < 2:
-        return []
-    order = np.argsort([float(np.max(np.abs(test.record.velocity))) for test in tests.tests], kind="stable")
-    found = {}
-    dealt = np.array(folds_in_turn(count))
-    for fold in sorted(set(dealt.tolist())):
-        out = order[dealt == fold].tolist()
-        rest = tests.subset([i for i in range(count) if i not in out])
-        fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT_EVALUATIONS) for fit in (bingham, knee)]
-        for i in out:
-            one = tests.subset([i])
-            left = [one.measured - fit.predicted(one) for fit in fits]
-            unseen = one.measured.size * (VISIBLE * one.peak) ** 2
-            of_bingham, of_knee = ((*squared_sums(one.measured, each), unseen) for each in left)
-            W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
-            name = one.tests[0].record.name
-            row = PredictedRow(record=name, **label_columns(labels), W_s_bingham=W_s_bingham, W_s_knee=W_s_knee)
-            found[i] = row, of_bingham, of_knee
-    return [found[i] for i in range(count)]
+    found: list[HeldOutLaws] = []
+    for i, left in enumerate(held_out(tests, bingham, knee)):
+        one = tests.subset([i])
+        unseen = one.measured.size * (VISIBLE * one.peak) ** 2
+        of_bingham, of_knee = ((*squared_sums(one.measured, each), unseen) for each in left)
+        W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
+        name = one.tests[0].record.name
+        row = PredictedRow(record=name, **label_columns(labels), W_s_bingham=W_s_bingham, W_s_knee=W_s_knee)
+        found.append((row, of_bingham, of_knee))
+    return found
 
 
 def _left_of(bingham: KneeFit, knee: KneeFit, tests: KneeData) -> float:

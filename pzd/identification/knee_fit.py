@@ -7,7 +7,7 @@ direction
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -15,10 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pzd.damper.compose import integrated_force, sampling_steps
+from pzd.damper.compiled.kernels import K
+from pzd.damper.compose import integrated_force, integrated_sensitivities, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
+from pzd.damper.path import Variables
+from pzd.fit.cross_validation import folds_in_turn
 from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, mid_stroke
@@ -58,6 +61,11 @@ class KneeCurve(NamedTuple):
     def damping(self) -> float:
         """Mean of both bleeds [N s/m], the C of the base row of the damper."""
         return 0.5 * (self.bleed[REBOUND] + self.bleed[COMPRESSION])
+
+    @property
+    def row(self) -> Array:
+        """(1, r) parameter row of the path."""
+        return constant_rows(self.friction, self.damping, self.stiffness, {"knee": self.effect()})[0]
 
     def effect(self) -> dict[str, float]:
         """Return the parameters of the law `knee` beside T0, `damping` and k."""
@@ -170,9 +178,15 @@ class KneeRecord:
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """Compute the force (m,) of the element [N], starting from the measured force less that of the gas (2,)."""
-        rows, _ = constant_rows(curve.friction, curve.damping, curve.stiffness, {"knee": curve.effect()})
-        first = float(self.record.force[0] - gas[0] - gas[1] * self.motion.displacement[0])
-        return integrated_force(rows, self.motion, self.steps, first, FORCE_TOLERANCE)[self.counted]
+        return integrated_force(curve.row, self.motion, self.steps, self._first(gas), FORCE_TOLERANCE)[self.counted]
+
+    def sensitivities(self, curve: KneeCurve, gas: Array, variables: Variables) -> Array:
+        """Compute the (m, v) derivatives of that force by variables."""
+        given = curve.row, variables, self.motion, self.steps, self._first(gas), FORCE_TOLERANCE
+        return integrated_sensitivities(*given)[1][self.counted]
+
+    def _first(self, gas: Array) -> float:
+        return float(self.record.force[0] - gas[0] - gas[1] * self.motion.displacement[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,6 +237,30 @@ class KneeData:
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """Compute the force (N,) of the element [N]."""
         return np.concatenate([t.simulated(curve, gas) for t in self.tests])
+
+    def sensitivities(self, curve_at: Callable[[Array], KneeCurve], x: Array, sizes: Array, gas: Array) -> Array:
+        """Compute the (N, p) derivatives of the force by p variables of a curve.
+
+        How the parameter row depends on them is differenced; the path integrates the derivatives exactly.
+
+        Parameters
+        ----------
+        curve_at : curve by the variables
+        x : (p,) variables
+        sizes : (p,) by which each is differenced, in steps of `DIFFERENCE`
+        gas : (2,) F_0 [N] and k_g [N/m]
+        """
+
+        def row(x: Array) -> Array:
+            found = curve_at(x).row[0]
+            found[K] = 1.0 / found[K]  # the compliance, see `Variables`
+            return np.nan_to_num(found)  # without an effect its columns may be infinite
+
+        steps = DIFFERENCE * np.diag(sizes)
+        along = np.stack([(row(x + step) - row(x - step)) / (2.0 * step.sum()) for step in steps])
+        columns = np.flatnonzero(np.any(along != 0.0, axis=0))
+        variables = Variables(columns, along[np.newaxis][:, :, columns], np.zeros(x.size))
+        return np.concatenate([t.sensitivities(curve_at(x), gas, variables) for t in self.tests])
 
 
 # --- Start: linear least squares with the knees on a grid ---
@@ -360,9 +398,16 @@ def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
     tests : of the condition
     stiffness : of the oil spring at the start [N/m]
     """
-    straight = descend(tests, KneeForm(), *grid_start(tests, stiffness))
+    straight = _with_what_shows(tests, descend(tests, KneeForm(), *grid_start(tests, stiffness)))
     bent = descend(tests, KneeForm(has_square=(True, True)), *grid_start(tests, stiffness, square=True))
-    best = bent if _shows(tests, bent, straight) else straight
+    if not _shows(tests, bent, straight):
+        return straight
+    bent = _with_what_shows(tests, bent)
+    return bent if _predicts(tests, bent, straight) else straight
+
+
+def _with_what_shows(tests: KneeData, best: KneeFit) -> KneeFit:
+    """Leave the square parts and knees out that do not show, one after the other, all else fitted again."""
     for left_out, direction in product((KneeForm.without_square, KneeForm.without_knee), (REBOUND, COMPRESSION)):
         form = left_out(best.form, direction)
         if form == best.form:
@@ -385,6 +430,41 @@ def without_gas(tests: KneeData, fit: KneeFit, term: int) -> KneeFit:
     force, spring = (each and term != other for other, each in enumerate(fit.form.has_gas))
     gas = np.where((force, spring), fit.gas, 0.0)
     return descend(tests, replace(fit.form, has_gas=(force, spring)), fit.curve, gas)
+
+
+def held_out(tests: KneeData, *fits: KneeFit) -> list[list[Array]]:
+    """Return what each fit leaves (n,) of every test that it is fitted without, test by test; [] of one test alone.
+
+    The tests are dealt into folds in the order of their speeds: the laws are functions of the speed, and every fold
+    leaves slow and fast ones to fit.
+
+    Parameters
+    ----------
+    tests : of the condition
+    fits : the optima over all tests, at which the refits start
+    """
+    count = len(tests.tests)
+    if count < 2:
+        return []
+    order = np.argsort([float(np.max(np.abs(test.record.velocity))) for test in tests.tests], kind="stable")
+    found = dict[int, list[Array]]()
+    dealt = np.array(folds_in_turn(count))
+    for fold in sorted(set(dealt.tolist())):
+        out = order[dealt == fold].tolist()
+        rest = tests.subset([i for i in range(count) if i not in out])
+        refitted = [descend(rest, fit.form, fit.curve, fit.gas, REFIT_EVALUATIONS) for fit in fits]
+        for i in out:
+            one = tests.subset([i])
+            found[i] = [one.measured - fit.predicted(one) for fit in refitted]
+    return [found[i] for i in range(count)]
+
+
+def _predicts(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
+    """Tell whether held-out tests are predicted better by a fit, in the geometric mean of their errors."""
+    left = held_out(tests, fit, without)
+    unseen = [test.record.force[test.counted].size * (VISIBLE * tests.peak) ** 2 for test in tests.tests]
+    ratios = [np.log((a @ a + least) / (b @ b + least)) for (a, b), least in zip(left, unseen, strict=False)]
+    return float(np.sum(ratios)) <= 0.0
 
 
 def _shows(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
@@ -420,9 +500,8 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
         return projected(tests.measured - simulated(x)) / norm
 
     def slopes(x: Array) -> Array:
-        at = simulated(x)
-        steps = DIFFERENCE * np.eye(x.size)
-        return projected(-np.column_stack([(simulated(x + step) - at) / DIFFERENCE for step in steps])) / norm
+        by = tests.sensitivities(lambda x: form.found(x, peak), x, np.ones(x.size), gas)
+        return projected(-by) / norm
 
     low, high = _search_bounds(tests, form)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
@@ -464,10 +543,5 @@ def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Arra
     natural = form.natural(curve)
     size = np.where(natural > 0.0, natural, tests.peak)
     size[0] = max(size[0], LEAST_FRICTION * tests.peak)  # at its limit of 0 the search leaves a friction of 1e-14 N
-    steps = DIFFERENCE * size
-    at = tests.simulated(curve, gas)
-    moved = [
-        (tests.simulated(form.curve(natural + step * unit), gas) - at) / step
-        for step, unit in zip(steps, np.eye(natural.size), strict=True)
-    ]
-    return np.column_stack([*moved, tests.gas_columns[:, form.gas_terms]])
+    by = tests.sensitivities(form.curve, natural, size, gas)
+    return np.column_stack([by, tests.gas_columns[:, form.gas_terms]])

@@ -30,6 +30,7 @@ from pzd.diagnosis.stage import diagnose
 from pzd.diagnosis.verdict import knee_verdict
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.knee import TRADE_SPEEDS, HeldOutLaws, force_changes, identify_knees, law_row
+from pzd.identification.knee_fit import KneeCurve, KneeData, KneeForm
 from pzd.identification.stage import identify
 from pzd.parallel.processes import no_listener
 from pzd.quantities import Control
@@ -493,3 +494,15 @@ def test_a_clicker_and_a_gas_pressure_in_one_name_are_told_apart() -> None:
 
 def test_the_trade_reads_its_forces_at_the_speeds_of_a_crank_of_100_mm() -> None:
     assert TRADE_SPEEDS == (0.052, 0.131, 0.262, 0.393, 0.524, 1.047, 1.571)
+
+
+def test_the_slopes_of_the_fit_are_derivatives_of_the_force(tests_of_a_knee: Rig) -> None:
+    tests = KneeData.of(tests_of_a_knee.records[2:4])
+    form = KneeForm(has_knee=(True, False), has_square=(True, True))
+    curve = KneeCurve(40.0, (2600.0, 900.0), 2e6, (0.08, np.inf), (800.0, 900.0), (4000.0, 1500.0))
+    x, gas = form.searched(curve, tests.peak), np.array([-250.0, 2500.0])
+    slopes = tests.sensitivities(lambda x: form.found(x, tests.peak), x, np.ones(x.size), gas)
+    for column, step in zip(slopes.T, 1e-4 * np.eye(x.size), strict=True):
+        before, after = (tests.simulated(form.found(x + s, tests.peak), gas) for s in (-step, step))
+        difference = (after - before) / 2e-4
+        assert np.linalg.norm(column - difference) <= 0.01 * np.linalg.norm(difference)
