@@ -254,7 +254,7 @@ class KneeData:
         def row(x: Array) -> Array:
             found = curve_at(x).row[0]
             found[K] = 1.0 / found[K]  # the compliance, see `Variables`
-            return np.nan_to_num(found)  # without an effect its columns may be infinite
+            return np.asarray(np.nan_to_num(found))  # without an effect its columns may be infinite
 
         steps = DIFFERENCE * np.diag(sizes)
         along = np.stack([(row(x + step) - row(x - step)) / (2.0 * step.sum()) for step in steps])
