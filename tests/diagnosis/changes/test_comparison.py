@@ -153,7 +153,7 @@ def test_what_changed_together_by_more_than_a_gain_goes_is_the_dampers(
     parameters: tuple[str, ...], rng: np.random.Generator
 ) -> None:
     """A gain of 5 % takes up half of it, and no change of one parameter beside that leaves less."""
-    for draw in rng.spawn(4):
+    for draw in rng.spawn(2):
         damper = drawn_damper(draw, voltages=(0.0,))
         changes = found(campaign(damper, draw), campaign(scaled(damper, **dict.fromkeys(parameters, 1.12)), draw))
         assert changes.verdict != "unchanged", changes.reason
