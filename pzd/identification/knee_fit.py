@@ -287,7 +287,7 @@ def grid_start(tests: KneeData, stiffness: float, *, square: bool = False) -> tu
     ----------
     tests : that are fitted
     stiffness : of the oil spring, which the grid does not search [N/m]
-    square : whether the bleeds have a square part q, no parameter of which falls below none
+    square : whether the bleeds have a square part q; then no slope, friction or q is below zero
     """
     from scipy.optimize import lsq_linear
 

@@ -18,6 +18,11 @@ NO_KNEE = 1.0e7
 STEEPEST = 1.0 - 1e-6
 """Largest share: the straight part of a bleed that is all but square is next to nothing beside the other's."""
 
+BLEED = ("beta", "q_reb", "q_comp")
+"""Parameters that make the bleed, beside C."""
+OPENS = ("F_reb", "F_comp")
+"""Parameters that say at which force a knee lies."""
+
 _SHARE = Search(lambda _: 1.0, (0.0,))
 _FORCES = Search(lambda s: s.force, (0.3,), logarithmic=True)
 _SLOPES = Search(lambda s: s.damping, (0.4,), logarithmic=True)
@@ -59,6 +64,11 @@ def bleed_factor(side: float, beta: float) -> float:
 def opens_at(T0: float, side: float, F_reb: float, F_comp: float) -> float:
     """Force [N] of the knee for the sign of the force."""
     return max(F_reb if side > 0.0 else F_comp, T0)
+
+
+def with_seal(force: float, friction: float) -> float:
+    """Force [N] of a knee where a seal rubs by so much more [N]: it rubs beside the oil, and the force holds it."""
+    return force if force >= NO_KNEE else max(force + friction, 0.0)
 
 
 def slope_beyond(side: float, C_reb: float, C_comp: float) -> float:

@@ -16,9 +16,9 @@ import numpy as np
 
 from pzd.damper.compose import respond
 from pzd.damper.confounders import known
-from pzd.damper.effect import Parameter, Scales
+from pzd.damper.effect import NODE_VOLTAGES, EffectValues, Parameter, Scales
 from pzd.damper.effects import library
-from pzd.damper.fitted_laws import fitted_laws
+from pzd.damper.fitted_laws import fitted_laws, knee
 from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
@@ -170,9 +170,8 @@ class FirstState:
             else:
                 self._move_effect(effects, c, x)
         base = tuple(rows[id(row)] for row in self.damper.base)
-        if "knee" in effects:
-            more = [float(np.mean([rows[id(row)].T0_N - row.T0_N for row in group])) for _, group in groups]
-            effects["knee"] = lifted(effects["knee"], more)
+        if knee.EFFECT.name in effects:
+            effects[knee.EFFECT.name] = self._rubbed(effects[knee.EFFECT.name], rows)
         damper = self.damper.model_copy(update={"base": base, "effects": effects})
         if not placed:
             return damper
@@ -181,6 +180,18 @@ class FirstState:
         for c, x in placed:
             self._move_effect(effects, c, x)
         return damper.model_copy(update={"effects": effects})
+
+    def _rubbed(self, law: EffectValues, rows: Mapping[int, BaseRow]) -> dict[str, float | tuple[float, ...]]:
+        """Return the knee law beside the T0 of other rows, by the identity of those whose place they take."""
+        groups = rows_per_voltage(self.damper.base)
+        more = [float(np.mean([rows[id(row)].T0_N - row.T0_N for row in group])) for _, group in groups]
+        values = dict(law)
+        for name in knee.OPENS:
+            force, nodes = np.atleast_1d(law[name]), np.atleast_1d(law.get(NODE_VOLTAGES, 0.0))
+            rubs = np.interp(nodes, [voltage for voltage, _ in groups], more)
+            moved = [knee.with_seal(*each) for each in zip(force.tolist(), rubs.tolist(), strict=True)]
+            values[name] = tuple(moved) if isinstance(law[name], tuple) else moved[0]
+        return values
 
     def _row(self, row: BaseRow, c: Coordinate, x: float, warmer: float | None) -> BaseRow:
         if c.name == "temperature":
@@ -246,28 +257,6 @@ def values_by_control(c: Coordinate, before: Sequence[float], x: float) -> tuple
     parameter = known_parameter(c.name, c.parameter)
     moved = (v + x * c.scale if c.added else v * (1.0 + x) for v in before)
     return tuple(float(np.clip(v, parameter.low, parameter.high)) for v in moved)
-
-
-KNEE_FORCES = ("F_reb", "F_comp")
-BLEED = ("beta", "q_reb", "q_comp")
-"""Numbers of the knee law that make its bleed, beside C."""
-
-
-def lifted(
-    knee: Mapping[str, float | tuple[float, ...]], friction: Sequence[float]
-) -> dict[str, float | tuple[float, ...]]:
-    """Return the numbers of the knee law where a seal rubs by so much more at each control signal [N].
-
-    It rubs beside the oil at every speed, and the force of the knee holds it.
-    """
-    values = dict(knee)
-    for name in KNEE_FORCES:
-        force = values[name]
-        if isinstance(force, tuple):
-            values[name] = tuple(max(f + more, 0.0) for f, more in zip(force, friction, strict=True))
-        else:
-            values[name] = max(force + float(np.mean(friction)), 0.0)
-    return values
 
 
 # --- The candidates
@@ -379,7 +368,7 @@ def _with_damping(found: Sequence[Candidate], *, of_bleed: bool) -> Candidate:
     """
     damping = next(c for c in found if c.name == "C")
     law = max((c for c in found if c.name in fitted_laws()), key=lambda c: len(c.coordinates))
-    more = [c for c in law.coordinates if not of_bleed or c.parameter in BLEED]
+    more = [c for c in law.coordinates if not of_bleed or c.parameter in knee.BLEED]
     coordinates = (*damping.coordinates, *more)
     return replace(law, coordinates=coordinates, starts=((0.0,) * len(coordinates),))
 

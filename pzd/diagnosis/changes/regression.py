@@ -45,7 +45,9 @@ LEAST_VARIANCE = 1e-10
 MUCH_OF_TESTS = 0.5
 """Share of the prior that the tests have each of their own from which a fit is begun with little of it too."""
 MUCH_WITHOUT_NAME = 0.15
-"""Share of the difference without a name from which a fit is begun with all but none of it too."""
+"""Share of the difference without a name from which a fit is begun with all but none of it too.
+
+Reason: what is left by a change that explains the difference is a few hundredths, or a moment; not tuned."""
 STEP = 1e-3
 """Step of a coordinate over which the force is differenced: far above the tolerance of the simulations."""
 EVALUATIONS = 12
