@@ -76,7 +76,7 @@ EXPORTED = {
     "stiff": Damper(base=tuple(row.model_copy(update={"k_N_per_m": 1e9}) for row in CONTROLLED)),
     "orifice": with_effects(DAMPERS["plain"], orifice_quadratic={"q": 2500.0}),
     "relief": with_effects(DAMPERS["plain"], relief_valve={"F_r": 1000.0, "C_r": 500.0}),
-    "knee": with_effects(DAMPERS["plain"], knee=KNEE),
+    "knee": with_effects(DAMPERS["plain"], knee=KNEE | {"q_reb": 9000.0, "q_comp": 4000.0}),
     "knee and relief": with_effects(DAMPERS["plain"], knee=KNEE, **IN_THE_FLOW),
     "lash": with_effects(DAMPERS["plain"], lash={"delta": 8e-4}),
     "play": with_effects(DAMPERS["plain"], piezo_hysteresis={"r": 12.0}),
