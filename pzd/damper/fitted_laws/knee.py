@@ -18,10 +18,20 @@ NO_KNEE = 1.0e7
 STEEPEST = 1.0 - 1e-6
 """Largest share: the straight part of a bleed that is all but square is next to nothing beside the other's."""
 
-BLEED = ("beta", "q_reb", "q_comp")
-"""Parameters that make the bleed, beside C."""
 OPENS = ("F_reb", "F_comp")
 """Parameters that say at which force a knee lies."""
+PARTS = (
+    ("F_reb", "C_reb"),
+    ("F_comp", "C_comp"),
+    ("C", "beta", "q_reb"),
+    ("C", "beta", "q_comp"),
+    ("C", "beta", "q_reb", "q_comp"),
+    ("C", "beta", "q_reb", "F_reb", "C_reb"),
+    ("C", "beta", "q_comp", "F_comp", "C_comp"),
+    ("C", "beta", "q_reb", "q_comp", *OPENS, "C_reb", "C_comp"),
+)
+"""What changes together, C being that of the element: the shims of one side, the bleed of one and of both, all of one
+side, and all by the oil."""
 
 _SHARE = Search(lambda _: 1.0, (0.0,))
 _FORCES = Search(lambda s: s.force, (0.3,), logarithmic=True)

@@ -8,7 +8,7 @@ it does includes what no model explains.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -277,7 +277,7 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
             continue
         found += _present(first, name) if present else [_absent(first, name)]
         if present and name in fitted_laws():
-            found += [_with_damping(found, of_bleed=each) for each in (True, False)]
+            found += _parts_of_law(found)
     return [candidate for candidate in found if all(c.low < c.high for c in candidate.coordinates)]
 
 
@@ -360,17 +360,16 @@ def _absent(first: FirstState, name: str) -> Candidate:
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
 
 
-def _with_damping(found: Sequence[Candidate], *, of_bleed: bool) -> Candidate:
-    """Return C and the numbers of the law that goes on where it ends, or those alone that say more of the bleed.
+def _parts_of_law(found: Sequence[Candidate]) -> Iterator[Candidate]:
+    """Yield what of the law changes together: what one needle, one stack of shims, one piston face or the oil changes.
 
-    A needle that is opened changes the whole bleed, a thinner oil all of the law. Neither part explains by itself what
-    both did: the tests then seem to differ in their gains.
+    By itself no number of them explains what all did: the tests then seem to differ in their gains.
     """
-    damping = next(c for c in found if c.name == "C")
+    (damping,) = next(c for c in found if c.name == "C").coordinates
     law = max((c for c in found if c.name in fitted_laws()), key=lambda c: len(c.coordinates))
-    more = [c for c in law.coordinates if not of_bleed or c.parameter in knee.BLEED]
-    coordinates = (*damping.coordinates, *more)
-    return replace(law, coordinates=coordinates, starts=((0.0,) * len(coordinates),))
+    for names in knee.PARTS:
+        numbers = [c for c in (damping, *law.coordinates) if c.parameter in names]
+        yield replace(law, coordinates=tuple(numbers), starts=((0.0,) * len(numbers),))
 
 
 def _closer(starts: Sequence[float]) -> tuple[float, ...]:

@@ -563,3 +563,16 @@ def test_the_same_recordings_in_both_states_are_told(rng: np.random.Generator) -
     changes = found(tests, tests)
     assert changes.verdict == "unchanged"
     assert "the tests of aged are those of new once more" in changes.reason
+
+
+def test_a_needle_of_one_side_changes_the_bleed_of_that_side(rng: np.random.Generator) -> None:
+    row = BaseRow(T0_N=35.0, C_Ns_per_m=1000.0, k_N_per_m=1.5e6)
+    beta = (0.8 * 1200.0 - 800.0) / (0.8 * 1200.0 + 800.0)  # rebound from 1200 N s/m to four fifths of it
+    opened = row.model_copy(update={"C_Ns_per_m": 0.5 * (0.8 * 1200.0 + 800.0)})
+    after = Damper(base=(opened,), effects={"knee": JET | {"beta": beta, "q_reb": JET["q_reb"] / 1.3**2}})
+    before = campaign(Damper(base=(row,), effects={"knee": JET}), rng, WIDE)
+    changes = found(before, campaign(after, rng, WIDE), IdentifyConfig(law="knee"))
+    assert changes.verdict == "changed"
+    told = {c.parameter: c for c in changes.changes}
+    assert {"q_reb"} <= set(told) <= {"C", "beta", "q_reb"}
+    assert told["q_reb"].to == pytest.approx(told["q_reb"].from_ / 1.3**2, rel=0.05)
