@@ -120,7 +120,9 @@ def characteristics(found: Characteristics, control: Control) -> Iterator[Table]
             (
                 *conditions(control),
                 Column("gas_force_N", "gas force", "N", lambda row: static_force(row, row.gas_force_N, NO_GAS)),
-                Column("friction_N", "friction", "N", lambda row: static_force(row, row.friction_N, "no line leads to it")),
+                Column(
+                    "friction_N", "friction", "N", lambda row: static_force(row, row.friction_N, "no line leads to it")
+                ),
                 Column("velocity_m_per_s", "slowest speed", "m/s"),
                 Column("method", "how"),
             ),

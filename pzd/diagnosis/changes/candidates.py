@@ -201,10 +201,17 @@ class FirstState:
         value = getattr(row, column)
         if c.logarithmic:
             return row.model_copy(update={column: value * float(np.exp(x))})
-        share = value if value > LEAST_FRICTION * self.force or c.node is None else self.force
-        if c.node is None and all(LEAST_FRICTION * self.force >= r.T0_N for r in self.damper.base):
-            share = self.force
-        return row.model_copy(update={column: max(value + x * share, 0.0)})
+        return row.model_copy(update={column: max(value + x * self._friction_unit(value, c.node), 0.0)})
+
+    def _friction_unit(self, friction: float, node: int | None) -> float:
+        """Return by how much a T0 [N] changes by one unit of its coordinate, of one control signal or of all [N]."""
+        of_all = node is None and any(LEAST_FRICTION * self.force < row.T0_N for row in self.damper.base)
+        return friction if of_all or friction > LEAST_FRICTION * self.force else self.force
+
+    def least_friction(self, node: int | None) -> float:
+        """Return the coordinate of T0 at which no friction is left, at one control signal or at all."""
+        rows = self.damper.base if node is None else rows_per_voltage(self.damper.base)[node][1]
+        return min(-row.T0_N / (self._friction_unit(row.T0_N, node) or 1.0) for row in rows)
 
     def _move_effect(self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float) -> None:
         parameter = known_parameter(c.name, c.parameter)
@@ -295,12 +302,13 @@ def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Ca
     compared = sorted({nearest_node(groups, c.voltage) for c in comparisons})
     found = []
     for name, unit in ELEMENT_UNITS.items():
-        low, high = (-np.inf, np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
+        low, high = (first.least_friction(None), np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
         whole = Coordinate(name, name, "damper", unit, 1.0, None, low, high, name != "T0")
         starts = FRICTION_STARTS if name == "T0" else RATIO_STARTS
         found.append(Candidate(name, "damper", (whole,), tuple((x,) for x in starts)))
         if len(compared) > 1:
-            nodes = tuple(replace(whole, node=node) for node in compared)
+            lows = [first.least_friction(node) if name == "T0" else low for node in compared]
+            nodes = tuple(replace(whole, node=node, low=least) for node, least in zip(compared, lows, strict=True))
             found.append(Candidate(name, "damper", nodes, tuple((x,) * len(nodes) for x in starts)))
     return found
 

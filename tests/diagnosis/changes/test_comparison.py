@@ -576,3 +576,13 @@ def test_a_needle_of_one_side_changes_the_bleed_of_that_side(rng: np.random.Gene
     told = {c.parameter: c for c in changes.changes}
     assert {"q_reb"} <= set(told) <= {"C", "beta", "q_reb"}
     assert told["q_reb"].to == pytest.approx(told["q_reb"].from_ / 1.3**2, rel=0.05)
+
+
+def test_a_friction_that_is_gone_is_none(rng: np.random.Generator) -> None:
+    row = BaseRow(T0_N=60.0, C_Ns_per_m=2200.0, k_N_per_m=3.8e6)
+    gone = row.model_copy(update={"T0_N": 0.0})
+    before, after = (campaign(Damper(base=(each,)), rng, WIDE) for each in (row, gone))
+    (change,) = found(before, after).changes
+    assert (change.name, change.to, change.low95) == ("T0", 0.0, 0.0)
+    assert isinstance(change.high95, float)
+    assert change.high95 < 10.0
