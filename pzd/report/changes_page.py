@@ -70,7 +70,7 @@ def changes_page(found: Compared, control: Control) -> str:
     table: list[Block] = [_quantities(changes, control)] if changes.changes or changes.unchanged else []
     sections = [
         Section("what", "What changed", (Paragraph(sentence(changes.reason)), *table, Gallery(bars))),
-        Section("cycles", "Cycle by cycle", (Gallery(loops), Gallery(differences))),
+        Section("cycles", "Cycle by cycle", (*_left_out(found), Gallery(loops), Gallery(differences))),
         Section("trade", "Force at peak velocity", (_trade(found.cycles, control),)),
     ]
     if found.undetermined:
@@ -183,6 +183,12 @@ def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...
             name, at, amount(start, each.unit, 4), amount(to, each.unit, 4), interval, amount(change, each.unit),
             percent(relative), share,
         )  # fmt: skip
+
+
+def _left_out(found: Compared) -> Iterator[Block]:
+    """Say how many of the compared tests are drawn, where not all are."""
+    if len(found.cycles) > SHOWN:
+        yield Paragraph(f"Drawn are the {SHOWN} of {len(found.cycles)} compared tests that differ most.")
 
 
 def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:

@@ -10,7 +10,9 @@ import numpy as np
 
 from pzd.artefacts import NextTest
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict, holds_what_was
+from pzd.damper.compose import steady_force
 from pzd.damper.effects.accumulator import POLYTROPIC
+from pzd.damper.fitted_laws import knee
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import nearest_condition, rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
@@ -18,6 +20,7 @@ from pzd.diagnosis.changes.candidates import (
     Candidate,
     Coordinate,
     FirstState,
+    Of,
     Response,
     candidates,
     element_of,
@@ -47,6 +50,7 @@ from pzd.diagnosis.next_test import operating_envelope, separating_test
 from pzd.diagnosis.verdict import knee_note
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
+from pzd.identification.knee import TRADE_SPEEDS
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Array, mid_stroke
 from pzd.rig.config import Limits
@@ -72,6 +76,9 @@ LARGE_MODEL_ERROR = 0.05
 """Share of the force (r.m.s.) that the first damper misses in its own tests from which values are its model's.
 
 Reason: a model off by a twentieth has T0 and C off by about as much, more than the intervals of a change; not tuned."""
+LITTLE = 0.05
+"""Share of the difference (mean square) of one number that changed, below which it is believed only where its interval
+leaves out what was before. Not tuned."""
 GONE = 1e-3
 """Share of an interval by which a value may differ from that of an effect that is off, and be it.
 
@@ -211,12 +218,16 @@ class Findings:
         reported = self._reported(best)
         still = self._still(best, reported)
         reported = [change for change in reported if change not in still]
+        hardly = [name for name in _may_be_as_before(reported, of=("damper", "stand")) if _is_little(reported, name)]
+        reported = [change for change in reported if change.name not in hardly]
         zero = self._displacement_zero()
         of_damper = [change for change in reported if change.of == "damper"]
         verdict: Verdict = "changed" if of_damper else "unchanged"
-        if rivals:
+        if rivals or hardly:
             verdict = "ambiguous"
-        told = list(dict.fromkeys(name for names in others.values() for name in names))
+        told = list(dict.fromkeys([*hardly, *(name for names in others.values() for name in names)]))
+        if hardly:
+            others[NOTHING] = list(dict.fromkeys([*hardly, *others.get(NOTHING, [])]))
         much = self._left_share(difference) > self.diagnose.unexplained_share and self._may_be_seen(difference)
         if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
@@ -237,7 +248,9 @@ class Findings:
             reason.append(
                 f"{', '.join(unreached)} acts where no test of {self.before.name} came, and may have been there before"
             )
-        as_before = [_as_before(change) for change in still]
+        as_before = [_as_before(change) for change in still if _is_determined(change)]
+        loose = [change.parameter for change in still if not _is_determined(change)]
+        reason += [f"these tests do not determine {', '.join(loose)}"] if loose else []
         unchanged = tuple(each for each in (*as_before, *self._unchanged(best)) if each.name not in told)
         if verdict == "unchanged" and (beside := self._left_out_differs() or self._beyond_the_model(best)):
             verdict, reason = "unexplained", [*reason, beside]
@@ -691,6 +704,7 @@ class Findings:
             told.append(f"of the damper: {', '.join(of_damper)}")
             told += [words for name in of_damper if (words := self._kind_of_friction(name))]
             told += self._gas_before(of_damper)
+            told += self._by_law_told(of_damper)
         elif verdict == "unchanged":
             told.append("nothing of the damper changed visibly")
             if (hidden := self.search.hidden(self.best)) > self.diagnose.visible:
@@ -762,6 +776,22 @@ class Findings:
         if name == "stribeck_friction" and speed > fastest:
             return "stribeck_friction that falls off at no tested speed is dry friction beside the oil spring"
         return None
+
+    def _by_law_told(self, of_damper: Sequence[str]) -> list[str]:
+        """Say by how much the force of the knee law changes, slow and fast, in the terms of a dyno."""
+        if knee.EFFECT.name not in self.first.damper.effects or not {*ELEMENT_COLUMNS, knee.EFFECT.name} & {*of_damper}:
+            return []
+        fastest = max(float(np.max(np.abs(c.motion.velocity))) for c in self.comparisons)
+        reached = [speed for speed in TRADE_SPEEDS if speed <= fastest] or [fastest]
+        changed = self.first.changed(self.best.coordinates, self.best.values.tolist(), None)
+        at = self._voltages()[0], self._temperatures()[0]
+        told = []
+        for speed in dict.fromkeys((reached[0], reached[-1])):
+            either = np.array([speed, -speed])
+            grown = steady_force(changed, *at, either) / steady_force(self.first.damper, *at, either) - 1.0
+            rebound, compression = (f"{100.0 * share:+.2g} %" for share in grown.tolist())
+            told.append(f"{rebound} in rebound and {compression} in compression at {speed:.3g} m/s")
+        return [f"by the law, without the gas, the force changes by {', by '.join(told)}"]
 
     def _gas_before(self, of_damper: Sequence[str]) -> list[str]:
         """Say which gas of the first state a newly told constant force or stiffness adds to."""
@@ -844,9 +874,24 @@ def _holds_what_was(change: Change) -> bool:
     return all(holds_what_was(change, i) is True for i in nodes)  # of what no test shows none is held
 
 
-def _may_be_as_before(changes: Sequence[Change]) -> list[str]:
-    """Return the names of changes of the damper all of whose intervals hold the value in the first state."""
-    of_damper = [change for change in changes if change.of == "damper"]
+def _is_determined(change: Change) -> bool:
+    """Whether the tests would have shown a change of a quantity by `SHOWN` of itself, at every control signal."""
+    ends = [np.asarray(each, dtype=float) for each in (change.low95, change.high95, change.from_) if each is not None]
+    if len(ends) < 3:
+        return False
+    low, high, before = ends
+    return bool(np.all(high - low <= 2.0 * SHOWN * np.maximum(np.abs(before), np.abs(high))))
+
+
+def _is_little(changes: Sequence[Change], name: str) -> bool:
+    """Whether a change of one number makes next to nothing of the difference."""
+    mine = [change for change in changes if change.name == name]
+    return len(mine) == 1 and mine[0].share < LITTLE
+
+
+def _may_be_as_before(changes: Sequence[Change], of: Sequence[Of] = ("damper",)) -> list[str]:
+    """Return the names of changes of the damper, or of the stand too, whose intervals all hold what was before."""
+    of_damper = [change for change in changes if change.of in of]
     differ = {change.name for change in of_damper if not _holds_what_was(change)}
     return list(dict.fromkeys(change.name for change in of_damper if change.name not in differ))
 

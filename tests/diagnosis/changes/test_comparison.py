@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -26,7 +27,7 @@ from pzd.artefacts.changes import Change
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.changes.comparison import _may_be_as_before, changes_between
+from pzd.diagnosis.changes.comparison import _is_determined, _is_little, _may_be_as_before, changes_between
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
@@ -502,13 +503,27 @@ def test_a_gas_that_grew_is_told_with_the_gas_that_was_there(rng: np.random.Gene
     assert "preload_offset and gas_spring add to the gas of new, an accumulator with F_g = 150 N" in changes.reason
 
 
+def change(name: str, low: float, parameter: str = "", share: float = 0.5) -> Change:
+    return Change(name=name, parameter=parameter or name, of="damper", unit="N", from_=100.0, to=90.0, low95=low,
+                  high95=105.0 if low < 100.0 else 120.0, share=share, reason="")  # fmt: skip
+
+
+def test_what_the_tests_do_not_determine_is_not_as_it_was() -> None:
+    """An interval over seven decades stood under `unchanged`, since it held what was before."""
+    assert _is_determined(change("knee", 80.0))
+    assert not _is_determined(change("knee", 0.05))
+
+
+def test_a_little_change_of_one_number_is_believed_where_its_interval_leaves_out_what_was() -> None:
+    """A gain of 4 (-18 to 10) % of no part of the difference was told as what the stand had done."""
+    law = [change("knee", 80.0, "F_reb", 0.01), change("knee", 80.0, "C_reb", 0.01)]
+    assert _is_little([change("C", 80.0, share=0.01)], "C")
+    assert not _is_little([change("C", 80.0)], "C")
+    assert not _is_little(law, "knee")
+
+
 def test_what_may_be_as_it_was_is_said_to_be_open() -> None:
     """Of a change all of whose intervals hold the first value, and of no other one."""
-
-    def change(name: str, low: float, parameter: str = "") -> Change:
-        return Change(name=name, parameter=parameter or name, of="damper", unit="N", from_=100.0, to=90.0, low95=low,
-                      high95=105.0 if low < 100.0 else 120.0, share=0.5, reason="")  # fmt: skip
-
     assert _may_be_as_before([change("C", 80.0), change("T0", 101.0)]) == ["C"]
     law = [change("second_branch", 80.0, "T0_2"), change("second_branch", 101.0, "k_2")]
     assert _may_be_as_before(law) == []
@@ -576,6 +591,11 @@ def test_a_needle_of_one_side_changes_the_bleed_of_that_side(rng: np.random.Gene
     told = {c.parameter: c for c in changes.changes}
     assert {"q_reb"} <= set(told) <= {"C", "beta", "q_reb"}
     assert told["q_reb"].to == pytest.approx(told["q_reb"].from_ / 1.3**2, rel=0.05)
+    grown = re.findall(r"([+-][\d.]+) % in rebound and ([+-][\d.]+) % in compression at ([\d.]+) m/s", changes.reason)
+    # By hand, of 395 and 1277 N: slow it is softer in rebound alone; fast, where the shims are open, hardly.
+    (slow, fast) = (tuple(map(float, each)) for each in grown)
+    assert slow == pytest.approx((-34.0, 0.0, 0.052), abs=1.5)
+    assert fast == pytest.approx((-2.2, 0.0, 0.524), abs=0.5)
 
 
 def test_a_friction_that_is_gone_is_none(rng: np.random.Generator) -> None:
