@@ -25,6 +25,7 @@ from pzd.fit.cross_validation import folds_in_turn
 from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, mid_stroke
+from pzd.signals.kinematics import clean_displacement_of
 from pzd.signals.measures import VISIBLE, criterion, rms
 
 # --- Knee curve and search coordinates ---
@@ -201,7 +202,10 @@ class KneeData:
     def of(cls, records: Sequence[Record]) -> KneeData:
         """Collect tests, their displacement counted from mid-stroke."""
         middle = mid_stroke(r.displacement for r in records)
-        found = (KneeRecord(r, Motion.of(r).centred_on(middle), sampling_steps(r.time), in_motion(r)) for r in records)
+        # Without its noise, which a stiff oil spring would turn into force.
+        clean = (replace(r, displacement=clean_displacement_of(r)) for r in records)
+        motions = (Motion.of(r).centred_on(middle) for r in clean)
+        found = (KneeRecord(r, m, sampling_steps(r.time), in_motion(r)) for r, m in zip(records, motions, strict=True))
         return cls(tuple(found), middle)
 
     def subset(self, kept: Sequence[int]) -> KneeData:

@@ -246,6 +246,17 @@ def test_a_damper_written_before_bleeds_had_a_square_part_is_read() -> None:
     np.testing.assert_array_equal(of(TRUTH)(swing(2.0, 0.02)), of(TRUTH.with_effect("knee", now))(swing(2.0, 0.02)))
 
 
+def test_noise_of_the_displacement_is_no_force_of_a_stiff_oil_spring(rng: np.random.Generator) -> None:
+    """3 um and 8e6 N/m make 24 N where the rod turns, and the friction paid for it."""
+    row = TRUTH.base[0].model_copy(update={"k_N_per_m": 8e6})
+    clean = rig(of(TRUTH.model_copy(update={"base": (row,)})), rng, noise=1e-4)
+    noisy = [replace(r, displacement=r.displacement + 3e-6 * rng.standard_normal(r.time.size)) for r in clean.records]
+    (knee,) = identify(IdentifyConfig(law="knee"), Rig(tuple(noisy), ()), 1).knees.rows
+    assert knee.W_s < 1e-5
+    assert knee.friction_N == pytest.approx(40.0, abs=1.0)
+    assert knee.k_N_per_m == pytest.approx(8e6, rel=0.1)
+
+
 def test_a_knee_in_one_direction_alone_is_found_in_that_direction_alone(rng: np.random.Generator) -> None:
     values = {**TRUTH.effects["knee"], "F_comp": 1e7, "C_comp": 1400.0}
     (row,) = found(of(TRUTH.with_effect("knee", values)), rng).knees.rows
