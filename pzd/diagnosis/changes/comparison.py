@@ -77,8 +77,8 @@ LARGE_MODEL_ERROR = 0.05
 
 Reason: a model off by a twentieth has T0 and C off by about as much, more than the intervals of a change; not tuned."""
 LITTLE = 0.05
-"""Share of the difference (mean square) of one number that changed, below which it is believed only where its interval
-leaves out what was before. Not tuned."""
+"""Share of the difference (mean square) below which a change is believed only where its intervals leave out what was
+before. Not tuned."""
 GONE = 1e-3
 """Share of an interval by which a value may differ from that of an effect that is off, and be it.
 
@@ -210,24 +210,23 @@ class Findings:
     def changes(self) -> Changes:
         """Return verdict and tables."""
         best, rivals = self._settled()
-        others = {
-            name: list(dict.fromkeys(each for fitted in fits for each in _added(fitted, best)))
-            for name, fits in rivals.items()
-        }
         difference = self.difference(best)
         reported = self._reported(best)
         still = self._still(best, reported)
         reported = [change for change in reported if change not in still]
         hardly = [name for name in _may_be_as_before(reported, of=("damper", "stand")) if _is_little(reported, name)]
         reported = [change for change in reported if change.name not in hardly]
+        rivals = {name: fits for name, fits in rivals.items() if name not in hardly}
+        others = {
+            name: list(dict.fromkeys(each for fitted in fits for each in _added(fitted, best)))
+            for name, fits in rivals.items()
+        }
         zero = self._displacement_zero()
         of_damper = [change for change in reported if change.of == "damper"]
         verdict: Verdict = "changed" if of_damper else "unchanged"
-        if rivals or hardly:
+        if rivals:
             verdict = "ambiguous"
-        told = list(dict.fromkeys([*hardly, *(name for names in others.values() for name in names)]))
-        if hardly:
-            others[NOTHING] = list(dict.fromkeys([*hardly, *others.get(NOTHING, [])]))
+        told = list(dict.fromkeys(name for names in others.values() for name in names))
         much = self._left_share(difference) > self.diagnose.unexplained_share and self._may_be_seen(difference)
         if much and not any(map(self.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
             verdict = "unexplained"
@@ -251,6 +250,7 @@ class Findings:
         as_before = [_as_before(change) for change in still if _is_determined(change)]
         loose = [change.parameter for change in still if not _is_determined(change)]
         reason += [f"these tests do not determine {', '.join(loose)}"] if loose else []
+        reason += [f"{' and '.join(hardly)} may be as before: next to nothing of the difference"] if hardly else []
         unchanged = tuple(each for each in (*as_before, *self._unchanged(best)) if each.name not in told)
         if verdict == "unchanged" and (beside := self._left_out_differs() or self._beyond_the_model(best)):
             verdict, reason = "unexplained", [*reason, beside]
@@ -563,7 +563,7 @@ class Findings:
         )
 
     def _still(self, best: Fitted, reported: Sequence[Change]) -> list[Change]:
-        """Return the numbers of laws of both states that are as they were, where others of the same law are not."""
+        """Return the numbers of laws of both states that may be as they were, where others of the same law are not."""
         by_key = {(change.name, change.parameter): change for change in reported}
         found = []
         for candidate in best.candidates:
@@ -869,24 +869,28 @@ class Findings:
 
 
 def _holds_what_was(change: Change) -> bool:
-    """Whether the interval of a changed quantity holds its value in the first state, at every control signal."""
+    """Whether the interval of a changed quantity holds its value in the first state, at every control signal.
+
+    What no test shows may be anything.
+    """
+    if change.to is None:
+        return True
     nodes = range(len(change.at_voltage_V or (None,)))
     return all(holds_what_was(change, i) is True for i in nodes)  # of what no test shows none is held
 
 
 def _is_determined(change: Change) -> bool:
-    """Whether the tests would have shown a change of a quantity by `SHOWN` of itself, at every control signal."""
+    """Whether the interval of a quantity is no wider than `SHOWN` of itself, at every control signal."""
     ends = [np.asarray(each, dtype=float) for each in (change.low95, change.high95, change.from_) if each is not None]
     if len(ends) < 3:
         return False
     low, high, before = ends
-    return bool(np.all(high - low <= 2.0 * SHOWN * np.maximum(np.abs(before), np.abs(high))))
+    return bool(np.all(high - low <= SHOWN * np.maximum(np.abs(before), np.abs(high))))
 
 
 def _is_little(changes: Sequence[Change], name: str) -> bool:
-    """Whether a change of one number makes next to nothing of the difference."""
-    mine = [change for change in changes if change.name == name]
-    return len(mine) == 1 and mine[0].share < LITTLE
+    """Whether a change makes next to nothing of the difference."""
+    return all(change.share < LITTLE for change in changes if change.name == name)
 
 
 def _may_be_as_before(changes: Sequence[Change], of: Sequence[Of] = ("damper",)) -> list[str]:
