@@ -193,17 +193,21 @@ def _left_out(found: Compared) -> Iterator[Block]:
 
 def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
     """Return force at peak velocity, as the trade reads it: in rebound and compression, and by how many % it grew."""
-    header = ("test", control.name, "velocity", "rebound before", "after", "%", "compression before", "after", "%")
+    sides = ("after", "grew by", "%")
+    header = ("test", control.name, "velocity", "rebound before", *sides, "compression before", *sides)
     rows = []
     for cycle in sorted(cycles, key=_by_control_and_speed):
         cells = []
-        for at in (int(np.argmax(cycle.velocity)), int(np.argmin(cycle.velocity))):
+        for at, way in ((int(np.argmax(cycle.velocity)), 1.0), (int(np.argmin(cycle.velocity)), -1.0)):
             before, after = float(cycle.force_before[at]), float(cycle.force_after[at])
-            cells += [amount(before, "N"), amount(after, "N"), percent(_growth(before, after))]
+            grown = amount(way * (after - before), "N")
+            cells += [amount(before, "N"), amount(after, "N"), grown, percent(_growth(before, after))]
         at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
         test = cycle.after if cycle.before is not None else f"{cycle.after} (before: the model)"
         rows.append((test, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
-    title = "Force at the peak velocity of each test; in % by how much its magnitude grew, a dash where the sign turned"
+    title = (
+        "Force at the peak velocity of each test, with the gas, and by how much it grew; a dash where the sign turned"
+    )
     return TextTable(title, *_without_control_where_none(header, rows))
 
 

@@ -65,12 +65,12 @@ def cells(page: str, name: str) -> list[str]:
 
 def test_a_force_that_grew_in_either_direction_stands_with_a_plus_as_the_trade_reads_it() -> None:
     page = page_of(found(cycle("slow", 0.1, (400.0, -313.0), (380.0, -339.0))))
-    assert cells(page, "slow") == ["0.1 m/s", "400 N", "380 N", "-5 %", "-313 N", "-339 N", "8.3 %"]
+    assert cells(page, "slow") == ["0.1 m/s", "400 N", "380 N", "-20 N", "-5 %", "-313 N", "-339 N", "26 N", "8.3 %"]
 
 
 def test_a_force_whose_sign_turned_grew_by_no_percentage() -> None:
     page = page_of(found(cycle("slow", 0.1, (400.0, -20.0), (400.0, 30.0))))
-    assert cells(page, "slow")[-3:] == ["-20 N", "30 N", "-"]
+    assert cells(page, "slow")[-4:] == ["-20 N", "30 N", "-50 N", "-"]
 
 
 def test_the_motions_that_changed_most_are_drawn_in_the_order_of_their_speed() -> None:
