@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from pzd.damper.confounders import known
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes, without_laws
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
@@ -238,6 +239,8 @@ class Search:
         # What visibly leaves more than its absence, the tests taken to differ alike, does not explain it.
         tried = (self._with(before, p) for p in worth)
         fits = [f for f in tried if self._admissible(f, least(f)) and (opposed or self._leaves_less(f, before))]
+        # Of the parts of a law one with a number that no test determines would win, be dropped, and leave none of them.
+        fits = [f for f in fits if f.candidates[-1].name not in fitted_laws() or self._predicts(f, f.candidates[-1])]
         # Of two that do the same, what the stand may have done is not laid to the damper.
         return sorted(fits, key=lambda f: f.bic - BETTER * (f.candidates[-1].of == "stand"))
 
