@@ -606,3 +606,33 @@ def test_a_friction_that_is_gone_is_none(rng: np.random.Generator) -> None:
     assert (change.name, change.to, change.low95) == ("T0", 0.0, 0.0)
     assert isinstance(change.high95, float)
     assert change.high95 < 10.0
+
+
+def shimmed(opens: float, rng: np.random.Generator) -> tuple[Record, ...]:
+    """Tests of a race damper whose knees are round, its shims on the rebound side preloaded so much [N].
+
+    Equation: |v| = F / (c sqrt(F + F_l)) + s ln(1 + exp((F - F_o) / F_s)), a jet and the shims beside each other
+    """
+    force = np.geomspace(1e-3, 5e3, 4000)
+
+    def flow(c: float, opens: float, slope: float) -> np.ndarray:
+        return force / (c * np.sqrt(force + 60.0)) + 40.0 / slope * np.logaddexp(0.0, (force - opens) / 40.0)
+
+    made = []
+    motions = campaign(Damper(base=(BaseRow(T0_N=1.0, C_Ns_per_m=1.0, k_N_per_m=1e6),)), rng, WIDE)
+    for test in motions:
+        v, x = test.velocity, test.displacement
+        ways = (np.interp(np.abs(v), flow(*own), force) for own in ((300.0, opens, 1400.0), (250.0, 330.0, 1000.0)))
+        oil = np.where(v > 0.0, next(ways), -next(ways))
+        whole = oil + 40.0 * np.tanh(v / 2e-3) - 290.0 - 600.0 * x
+        made.append(replace(test, force=1.003 ** rng.standard_normal() * whole + 3.0 * rng.standard_normal(v.size)))
+    return tuple(made)
+
+
+def test_shims_that_are_preloaded_move_the_knee_of_their_side_however_round_it_is(rng: np.random.Generator) -> None:
+    changes = found(shimmed(520.0, rng), shimmed(600.0, rng), IdentifyConfig(law="knee"))
+    assert changes.verdict in ("changed", "ambiguous"), changes.reason
+    (told,) = (c for c in changes.changes if c.parameter == "F_reb")
+    assert 0.5 * 80.0 < told.to - told.from_ < 1.5 * 80.0
+    assert not {c.parameter for c in changes.changes} & {"F_comp", "C_comp", "q_comp"}
+    assert all(c.of == "damper" for c in changes.changes)
