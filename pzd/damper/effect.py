@@ -23,8 +23,9 @@ flow
     `direction_factor`: on T0, C and branches by the sign of F; `bleed_factor`: on C alone.
     `yield_force`, `yield_slope`: replace T0, in proportion to it.
     `viscous_force`, `viscous_slope`, `viscous_speed`: replace C w, in proportion to C; speed is the inverse.
-    `extra_force`, `extra_slope`: added to both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there
-    is a closed form. `opens_at`, `slope_beyond`: force beyond which the slope is another, by the sign of F too.
+    `extra_force`, `extra_slope`: added to both, 0 at w = 0, by the sign of F too; `extra_speed`: the flow speed at
+    C w + extra, where there is a closed form. `opens_at`, `slope_beyond`: force beyond which the slope is another, by
+    the sign of F too.
 parallel
     `law`: force parallel to the element by x, v and a of the piston, without memory; with `needs_displacement_zero` a
     fit looks for the zero of x too.

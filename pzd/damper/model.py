@@ -115,7 +115,8 @@ def _check_effect(name: str, values: EffectValues) -> None:
         raise InsideError(f"no effect is called {name}; {hint}", name, of_key=True)
     wanted = {p.name for p in effects[name].parameters}
     given = set(values) - {NODE_VOLTAGES}
-    if given != wanted - {p.name for p in effects[name].parameters if p.optional and p.name not in given}:
+    required = {p.name for p in effects[name].parameters if not p.optional}
+    if not required <= given <= wanted:
         unknown = sorted(given - wanted)
         says = f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})"
         raise InsideError(says, name, *unknown[:1], of_key=bool(unknown))

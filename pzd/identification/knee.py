@@ -19,7 +19,6 @@ from pzd.fit.cross_validation import (
     FEWEST_TESTS,
     PredictionError,
     log_ratios,
-    squared_sums,
     standard_error,
     student_errors,
 )
@@ -32,7 +31,7 @@ from pzd.identification.knee_fit import (
     KneeFit,
     fit_bingham,
     fit_knee,
-    held_out,
+    held_out_errors,
     without_gas,
 )
 from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
@@ -41,7 +40,7 @@ from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
 from pzd.record import SAME_TEMPERATURE, Condition, Labels
 from pzd.schema.errors import ConfigError
-from pzd.signals.measures import VISIBLE, criterion, rms
+from pzd.signals.measures import VISIBLE, rms
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.segmentation import separate_tests
 
@@ -331,12 +330,9 @@ def held_out_predictions(labels: Labels, tests: KneeData, knee: KneeFit, bingham
     knee, bingham : the optima over all tests, at which the refits start
     """
     found: list[HeldOutLaws] = []
-    for i, left in enumerate(held_out(tests, bingham, knee)):
-        one = tests.subset([i])
-        unseen = one.measured.size * (VISIBLE * one.peak) ** 2
-        of_bingham, of_knee = ((*squared_sums(one.measured, each), unseen) for each in left)
-        W_s_bingham, W_s_knee = (criterion(each, one.measured) for each in left)
-        name = one.tests[0].record.name
+    for test, (of_bingham, of_knee) in zip(tests.tests, held_out_errors(tests, bingham, knee), strict=False):
+        W_s_bingham, W_s_knee = (error / force for error, force, *_ in (of_bingham, of_knee))
+        name = test.record.name
         row = PredictedRow(record=name, **label_columns(labels), W_s_bingham=W_s_bingham, W_s_knee=W_s_knee)
         found.append((row, of_bingham, of_knee))
     return found
@@ -344,8 +340,8 @@ def held_out_predictions(labels: Labels, tests: KneeData, knee: KneeFit, bingham
 
 def _left_of(bingham: KneeFit, knee: KneeFit, tests: KneeData) -> float:
     """Return the share of the squared error of Bingham's law that the knee law leaves; what is invisible is none."""
-    unseen = tests.measured.size * (VISIBLE * tests.peak) ** 2
-    return float((knee.residuals @ knee.residuals + unseen) / (bingham.residuals @ bingham.residuals + unseen))
+    of_knee, of_bingham = (float(fit.residuals @ fit.residuals) + tests.invisible for fit in (knee, bingham))
+    return of_knee / of_bingham
 
 
 def law_row(

@@ -21,7 +21,7 @@ from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
 from pzd.damper.path import Variables
-from pzd.fit.cross_validation import folds_in_turn
+from pzd.fit.cross_validation import PredictionError, folds_in_turn, log_ratios, squared_sums
 from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, mid_stroke
@@ -153,6 +153,7 @@ class KneeForm:
 
 
 def _without(pair: tuple[bool, bool], direction: int) -> tuple[bool, bool]:
+    """Return a choice of directions without one."""
     return pair[0] and direction != 0, pair[1] and direction != 1
 
 
@@ -237,6 +238,11 @@ class KneeData:
     def peak(self) -> float:
         """Largest force [N]."""
         return float(np.max(np.abs(self.measured)))
+
+    @property
+    def invisible(self) -> float:
+        """Sum of squares [N^2] of an error that is not visible."""
+        return float(self.measured.size * (VISIBLE * self.peak) ** 2)
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """Compute the force (N,) of the element [N]."""
@@ -463,12 +469,22 @@ def held_out(tests: KneeData, *fits: KneeFit) -> list[list[Array]]:
     return [found[i] for i in range(count)]
 
 
+def held_out_errors(tests: KneeData, *fits: KneeFit) -> list[list[tuple[float, ...]]]:
+    """Return the entries of a `PredictionError` of each fit, test by test, each fitted without it."""
+    each = (tests.subset([i]) for i in range(len(tests.tests)))
+    return [
+        [(*squared_sums(one.measured, residuals), one.invisible) for residuals in left]
+        for one, left in zip(each, held_out(tests, *fits), strict=False)  # a test that is alone is not held out
+    ]
+
+
 def _predicts(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
     """Tell whether held-out tests are predicted better by a fit, in the geometric mean of their errors."""
-    left = held_out(tests, fit, without)
-    unseen = [test.record.force[test.counted].size * (VISIBLE * tests.peak) ** 2 for test in tests.tests]
-    ratios = [np.log((a @ a + least) / (b @ b + least)) for (a, b), least in zip(left, unseen, strict=False)]
-    return float(np.sum(ratios)) <= 0.0
+    entries = held_out_errors(tests, fit, without)
+    if not entries:
+        return True
+    one, other = (PredictionError.of_entries(range(len(entries)), own) for own in zip(*entries, strict=True))
+    return float(np.sum(log_ratios(one, other))) >= 0.0
 
 
 def _shows(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:

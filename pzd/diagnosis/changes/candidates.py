@@ -171,7 +171,7 @@ class FirstState:
                 self._move_effect(effects, c, x)
         base = tuple(rows[id(row)] for row in self.damper.base)
         if knee.EFFECT.name in effects:
-            effects[knee.EFFECT.name] = self._rubbed(effects[knee.EFFECT.name], rows)
+            effects[knee.EFFECT.name] = self._knees_beside(effects[knee.EFFECT.name], rows)
         damper = self.damper.model_copy(update={"base": base, "effects": effects})
         if not placed:
             return damper
@@ -181,7 +181,7 @@ class FirstState:
             self._move_effect(effects, c, x)
         return damper.model_copy(update={"effects": effects})
 
-    def _rubbed(self, law: EffectValues, rows: Mapping[int, BaseRow]) -> dict[str, float | tuple[float, ...]]:
+    def _knees_beside(self, law: EffectValues, rows: Mapping[int, BaseRow]) -> dict[str, float | tuple[float, ...]]:
         """Return the knee law beside the T0 of other rows, by the identity of those whose place they take."""
         groups = rows_per_voltage(self.damper.base)
         more = [float(np.mean([rows[id(row)].T0_N - row.T0_N for row in group])) for _, group in groups]

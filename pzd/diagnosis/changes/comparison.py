@@ -319,7 +319,7 @@ class Findings:
     def _may_be_seen(self, difference: Difference) -> bool:
         """Whether what is left may be seen: where the model stands for every test, a visible share of the peak.
 
-        It is the same of a difference that is hardly visible itself, which the error of the model makes up.
+        Of a difference that is hardly visible itself the error of the model makes up any share.
         """
         beyond = _beyond_noise(difference) >= self.diagnose.visible * self.first.force
         return beyond or any(c.before is not None for c in self.comparisons)
@@ -778,7 +778,7 @@ class Findings:
         return None
 
     def _by_law_told(self, of_damper: Sequence[str]) -> list[str]:
-        """Say by how much the force of the knee law changes, slow and fast, in the terms of a dyno."""
+        """Say by how much the force of the knee law changes, slow and fast, at the first control signal."""
         if knee.EFFECT.name not in self.first.damper.effects or not {*ELEMENT_COLUMNS, knee.EFFECT.name} & {*of_damper}:
             return []
         fastest = max(float(np.max(np.abs(c.motion.velocity))) for c in self.comparisons)
@@ -789,9 +789,10 @@ class Findings:
         for speed in dict.fromkeys((reached[0], reached[-1])):
             either = np.array([speed, -speed])
             grown = steady_force(changed, *at, either) / steady_force(self.first.damper, *at, either) - 1.0
-            rebound, compression = (f"{100.0 * share:+.2g} %" for share in grown.tolist())
+            rebound, compression = (f"{100.0 * share:+.1f} %" for share in grown.tolist())
             told.append(f"{rebound} in rebound and {compression} in compression at {speed:.3g} m/s")
-        return [f"by the law, without the gas, the force changes by {', by '.join(told)}"]
+        where = f" at {at[0]:.4g} {self.control.unit}" if len(self._voltages()) > 1 else ""
+        return [f"by the law, without the gas, the force{where} changes by {', by '.join(told)}"]
 
     def _gas_before(self, of_damper: Sequence[str]) -> list[str]:
         """Say which gas of the first state a newly told constant force or stiffness adds to."""
@@ -895,9 +896,9 @@ def _is_little(changes: Sequence[Change], name: str) -> bool:
 
 def _may_be_as_before(changes: Sequence[Change], of: Sequence[Of] = ("damper",)) -> list[str]:
     """Return the names of changes of the damper, or of the stand too, whose intervals all hold what was before."""
-    of_damper = [change for change in changes if change.of in of]
-    differ = {change.name for change in of_damper if not _holds_what_was(change)}
-    return list(dict.fromkeys(change.name for change in of_damper if change.name not in differ))
+    asked = [change for change in changes if change.of in of]
+    differ = {change.name for change in asked if not _holds_what_was(change)}
+    return list(dict.fromkeys(change.name for change in asked if change.name not in differ))
 
 
 def _as_before(change: Change) -> Unchanged:
