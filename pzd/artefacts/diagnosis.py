@@ -15,6 +15,8 @@ from pydantic import Field, model_validator
 from pzd.artefacts.csv_rows import Estimate, Files, read_files, write_files
 from pzd.artefacts.identified import ParameterRow
 from pzd.damper.confounders import known
+from pzd.damper.effect import NODE_VOLTAGES
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
@@ -92,6 +94,18 @@ class Value(Frozen):
         values = self.value if isinstance(self.value, tuple) else (self.value,)
         lows, highs = (end if isinstance(end, tuple) else (end,) * len(values) for end in (self.low95, self.high95))
         return tuple(map(Estimate, values, lows, highs))
+
+    def may_be(self, number: float) -> bool:
+        """Whether the interval of every value holds a number.
+
+        Examples
+        --------
+        >>> Value(value=150.0, low95=-10.0, high95=160.0, unit="N").may_be(0.0)
+        True
+        """
+        return all(
+            e.low95 is not None and e.high95 is not None and e.low95 <= number <= e.high95 for e in self.estimates
+        )
 
     @model_validator(mode="after")
     def _inside_its_interval(self) -> Value:
@@ -192,7 +206,7 @@ class Diagnosis(Frozen):
 
     @property
     def by_knee_law(self) -> bool:
-        """Whether the knee law was handed on and no effect looked for; others without a gap are `ambiguous`."""
+        """Whether the knee law misses nothing visible, so that none was tried; others without a gap are `ambiguous`."""
         return self.gap is None and not self.ranking and self.verdict != "ambiguous"
 
     @classmethod
@@ -443,7 +457,8 @@ class Diagnosed:
         rows = read_rows(folder / "parameters.csv", ParameterRow, control)
         baseline = read_yaml_model(folder / "plain.yaml", Damper, control)
         expected = {*diagnosis.effects, *baseline.effects}
-        if expected != set(damper.effects):
+        # Beside what is missing the law of the element may have a part that it hid from the fit without.
+        if expected != {name for name in damper.effects if name in expected or name not in fitted_laws()}:
             raise DataError(
                 f"{at(folder / 'damper.yaml')}: effects: must be those of diagnosis.json and plain.yaml, "
                 f"{', '.join(sorted(expected)) or 'none'} (got {', '.join(damper.effects) or 'none'})"
@@ -459,7 +474,7 @@ def _values(effect: str, diagnosis: Diagnosis, damper: Damper, control: Control)
     """Return the parameters of an adopted effect as the damper has them, without intervals where they were edited."""
     found: dict[str, Value] = {}
     given = damper.effects[effect]
-    voltages = given.get("at_voltage_V")
+    voltages = given.get(NODE_VOLTAGES)
     for parameter in known()[effect].parameters:
         value = given[parameter.name]
         at_voltage = voltages if isinstance(voltages, tuple) and isinstance(value, tuple) else None

@@ -11,7 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from pzd.artefacts.csv_rows import ConditionRow, Estimate, Files, RecordRow, read_files, write_files
-from pzd.damper.fitted_laws.knee import NO_KNEE
+from pzd.damper.effect import NODE_VOLTAGES
+from pzd.damper.fitted_laws import seal
+from pzd.damper.fitted_laws.knee import mean_bleed, parameters_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
 from pzd.schema.model import Frozen
@@ -25,6 +27,7 @@ OF_A_DIRECTION = (
     "knee_force_N",
     "knee_velocity_m_per_s",
     "blow_off_Ns_per_m",
+    "knee_spread_N",
 )
 """The columns of a direction, behind its name."""
 OF_BOTH = ("gas_force_N", "friction_N")
@@ -46,7 +49,7 @@ class KneeRow(ConditionRow):
     rebound_bleed_square_Ns2_per_m2_low95: float | None = None
     rebound_bleed_square_Ns2_per_m2_high95: float | None = None
     rebound_knee_force_N: float | None = Field(ge=0.0)
-    """With the seal friction, without the gas."""
+    """Where bleed and blow-off meet, with the seal friction and without the gas; a round knee stays off it."""
     rebound_knee_force_N_low95: float | None
     rebound_knee_force_N_high95: float | None
     rebound_knee_velocity_m_per_s: float | None = Field(gt=0.0)
@@ -56,6 +59,10 @@ class KneeRow(ConditionRow):
     """Slope beyond the knee."""
     rebound_blow_off_Ns_per_m_low95: float | None
     rebound_blow_off_Ns_per_m_high95: float | None
+    rebound_knee_spread_N: float | None = Field(default=None, gt=0.0)
+    """Scale of the forces about that one over which the valve opens; empty where the knee is sharp."""
+    rebound_knee_spread_N_low95: float | None = None
+    rebound_knee_spread_N_high95: float | None = None
     compression_bleed_Ns_per_m: float = Field(gt=0.0)
     compression_bleed_Ns_per_m_low95: float
     compression_bleed_Ns_per_m_high95: float
@@ -71,10 +78,18 @@ class KneeRow(ConditionRow):
     compression_blow_off_Ns_per_m: float | None = Field(gt=0.0)
     compression_blow_off_Ns_per_m_low95: float | None
     compression_blow_off_Ns_per_m_high95: float | None
+    compression_knee_spread_N: float | None = Field(default=None, gt=0.0)
+    compression_knee_spread_N_low95: float | None = None
+    compression_knee_spread_N_high95: float | None = None
     friction_N: float = Field(ge=0.0)
     """Seal friction T0, the same in both directions: half of what the force changes by where the rod turns round."""
     friction_N_low95: float
     friction_N_high95: float
+    seal_m_per_s: float | None = Field(default=None, gt=0.0)
+    """v_s, the speed of the rod by which its friction has turned round; empty where friction does not act on the rod,
+    but on the flow behind the oil spring."""
+    seal_m_per_s_low95: float | None = None
+    seal_m_per_s_high95: float | None = None
     gas_force_N: float
     """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out. 0 where no test shows
     one: then all else is fitted without it."""
@@ -99,6 +114,16 @@ class KneeRow(ConditionRow):
     """R.m.s. residual of the law beyond noise, as a share of peak force; 0 where noise alone explains it."""
     status: str = Field(pattern=r"^(ok|weak: .*)$")
     """`ok`, or `weak: ...` with the parameters and the reason."""
+
+    @property
+    def friction_on_rod(self) -> float:
+        """Friction of a seal on the rod, beside the oil [N]."""
+        return 0.0 if self.seal_m_per_s is None else self.friction_N
+
+    @property
+    def friction_of_flow(self) -> float:
+        """T0 of the element, behind the oil spring [N]."""
+        return self.friction_N - self.friction_on_rod
 
 
 class KneeForceRow(ConditionRow):
@@ -246,7 +271,7 @@ KNEES: Files = {
 
 
 def knee_damper(rows: Sequence[KneeRow]) -> Damper:
-    """Return the damper of one setting by the knee law: a base row a condition, the knee and the gas as effects.
+    """Return the damper of one setting by the knee law: a base row a condition, knee, seal and gas as effects.
 
     Gas force and gas spring are left out where the fit of every condition went without them. Effects know no
     temperature: where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
@@ -263,12 +288,14 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: -np.inf if v is None else v)
     parts = [[row for row in rows if row.voltage_V == voltage] for voltage in voltages]
     effects = {
+        "seal": [_mean([_seal(row) for row in part]) for part in parts],
         "knee": [_mean([_knee(row) for row in part]) for part in parts],
         "preload_offset": [_mean([{"F_0": gas_force(row)} for row in part]) for part in parts],
         "gas_spring": [_mean([{"k_g": row.gas_spring_N_per_m} for row in part]) for part in parts],
     }
     shown = {
         "knee": True,
+        "seal": any(row.seal_m_per_s is not None for row in rows),
         "preload_offset": any(row.gas_force_N != 0.0 for row in rows),
         "gas_spring": any(row.gas_spring_N_per_m != 0.0 for row in rows),
     }
@@ -278,8 +305,8 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
             BaseRow(
                 voltage_V=row.voltage_V,
                 temperature_degC=row.temperature_degC,
-                T0_N=row.friction_N,
-                C_Ns_per_m=0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m),
+                T0_N=row.friction_of_flow,
+                C_Ns_per_m=mean_bleed(row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m),
                 k_N_per_m=row.k_N_per_m,
             )
             for row in rows
@@ -289,18 +316,24 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     )
 
 
+def _seal(row: KneeRow) -> dict[str, float]:
+    """Return the parameters of the law `seal`."""
+    return {"F_s": row.friction_on_rod, "v_s": row.seal_m_per_s or seal.EFFECT.parameter("v_s").neutral}
+
+
 def _knee(row: KneeRow) -> dict[str, float]:
-    """Return the parameters of the law `knee`; a direction without one goes on with its bleed."""
-    rebound, compression = row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m
-    return {
-        "beta": (rebound - compression) / (rebound + compression),
-        "F_reb": NO_KNEE if row.rebound_knee_force_N is None else row.rebound_knee_force_N,
-        "C_reb": rebound if row.rebound_blow_off_Ns_per_m is None else row.rebound_blow_off_Ns_per_m,
-        "F_comp": NO_KNEE if row.compression_knee_force_N is None else row.compression_knee_force_N,
-        "C_comp": compression if row.compression_blow_off_Ns_per_m is None else row.compression_blow_off_Ns_per_m,
-        "q_reb": row.rebound_bleed_square_Ns2_per_m2 or 0.0,
-        "q_comp": row.compression_bleed_square_Ns2_per_m2 or 0.0,
-    }
+    """Return the parameters of the law `knee`, whose forces are those of the oil."""
+    forces = (
+        None if force is None else force - row.friction_on_rod
+        for force in (row.rebound_knee_force_N, row.compression_knee_force_N)
+    )
+    return parameters_of(
+        (row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m),
+        (row.rebound_bleed_square_Ns2_per_m2 or 0.0, row.compression_bleed_square_Ns2_per_m2 or 0.0),
+        (next(forces), next(forces)),
+        (row.rebound_blow_off_Ns_per_m, row.compression_blow_off_Ns_per_m),
+        (row.rebound_knee_spread_N or 0.0, row.compression_knee_spread_N or 0.0),
+    )
 
 
 def _mean(values: Sequence[dict[str, float]]) -> dict[str, float]:
@@ -312,4 +345,4 @@ def _per_voltage(values: Sequence[dict[str, float]], voltages: Sequence[float]) 
     if len(values) == 1:
         return dict(values[0])
     lists = {name: tuple(each[name] for each in values) for name in values[0]}
-    return {**lists, "at_voltage_V": tuple(voltages)}
+    return {**lists, NODE_VOLTAGES: tuple(voltages)}

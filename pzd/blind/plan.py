@@ -101,7 +101,8 @@ def hideable(campaign: TestPlan, kind: Kind) -> list[Hidden]:
         return [()]
     if kind == "outside":
         return [(name,) for name in FORMS]
-    effects = [name for name, e in nameable().items() if e.needs != "voltage" or campaign.moves_voltage]
+    hidden = {name: effect for name, effect in nameable().items() if effect.hidden is not None}
+    effects = [name for name, effect in hidden.items() if effect.needs != "voltage" or campaign.moves_voltage]
     if kind == "single":
         return [(name,) for name in effects]
     place = {name: i for i, name in enumerate(effects)}

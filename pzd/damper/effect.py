@@ -25,7 +25,7 @@ flow
     `viscous_force`, `viscous_slope`, `viscous_speed`: replace C w, in proportion to C; speed is the inverse.
     `extra_force`, `extra_slope`: added to both, 0 at w = 0, by the sign of F too; `extra_speed`: the flow speed at
     C w + extra, where there is a closed form. `opens_at`, `slope_beyond`: force beyond which the slope is another, by
-    the sign of F too.
+    the sign of F too; `spread`: of the forces about that one at which it opens [N], 0 where it opens at once.
 parallel
     `law`: force parallel to the element by x, v and a of the piston, without memory; with `needs_displacement_zero` a
     fit looks for the zero of x too.
@@ -202,10 +202,12 @@ class Beside:
     """Stiffest oil spring [N/m], infinite for a rigid damper."""
     force: float
     """Largest of the tests [N]."""
+    static: float
+    """Force at rest in the middle of the stroke, of a gas or a weight [N]."""
 
 
 def _nothing_else(values: EffectValues, beside: Beside) -> str | None:
-    """Return no other effect: the default of `Effect.nearly`."""
+    """Return no other effect, or nothing against it: the default of `Effect.nearly` and `Effect.contradicted`."""
     return None
 
 
@@ -244,6 +246,11 @@ class Effect:
     """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
     nearly: Callable[[EffectValues, Beside], str | None] = _nothing_else
     """Which other effect many would call it with such values, however well tests tell the two apart: its rival."""
+    contradicted: Callable[[EffectValues, Beside], str | None] = _nothing_else
+    """Why such values are those of no such effect beside what else the damper has; None where they may be."""
+    beside_gas: bool = False
+    """Whether it is an effect of its own beside a static force alone, as a gas has; without one it is that which it
+    nearly is. No benchmark hides it."""
     by_speed_alone: bool = False
     """Whether a force beside the flow depends on the speed alone, so that it bends the same curve as the flow does."""
     natural: Callable[[Mapping[str, float], float], bool] = _always
@@ -312,6 +319,7 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
         "extra_speed": Law(("force", "C", "side"), suffices=False),
         "opens_at": Law(("T0", "side"), ("slope_beyond",)),
         "slope_beyond": Law(("side",), suffices=False),
+        "spread": Law(("side",), ("opens_at",), suffices=False),
     },
     "parallel": {"law": Law(("x", "v", "a"))},
     "branch": {

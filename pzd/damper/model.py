@@ -105,6 +105,29 @@ class Damper(Frozen):
         """Return the damper on a stand whose displacement reads more by an amount [m]."""
         return self.model_copy(update={"zero_m": self.zero_m + by})
 
+    def about(self, zero: float) -> Damper:
+        """Return the same damper with the force and stiffness beside the element about another displacement [m].
+
+        As it is where an effect acts at a place of the stroke, for which no force and stiffness make up.
+
+        Equation: F_0 + k_g (x - z) = (F_0 + k_g (z' - z)) + k_g (x - z')
+        """
+        gas, preload = (self.effects.get(name, {}) for name in ("gas_spring", "preload_offset"))
+        nodes = {values[NODE_VOLTAGES] for values in (gas, preload) if NODE_VOLTAGES in values}
+        if any(acts_at_a_place(name) for name in self.effects) or len(nodes) > 1:
+            return self
+        moved = np.multiply(gas.get("k_g", 0.0), zero - self.zero_m)
+        if not moved.any():
+            return self.model_copy(update={"zero_m": zero})
+        force = np.add(preload.get("F_0", 0.0), moved)
+        values = {"F_0": tuple(force.tolist()), NODE_VOLTAGES: nodes.pop()} if nodes else {"F_0": float(force)}
+        return self.model_copy(update={"effects": {**self.effects, "preload_offset": values}, "zero_m": zero})
+
+
+def acts_at_a_place(name: str) -> bool:
+    """Whether an effect of that name acts at a place of the stroke, as a stop does."""
+    return name in library() and any(parameter.position for parameter in library()[name].parameters)
+
 
 def _check_effect(name: str, values: EffectValues) -> None:
     """Refuse an unknown effect, missing or unknown parameters, and values beyond the limits."""

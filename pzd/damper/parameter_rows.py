@@ -30,10 +30,8 @@ from pzd.damper.confounders import module_of
 from pzd.damper.effect import NODE_VOLTAGES, arguments, functions
 from pzd.damper.element import STIFFEST
 from pzd.damper.model import BaseRow, Damper
-from pzd.record import Array
+from pzd.record import CONSTANT_SHARE, Array
 
-_SAME_VOLTAGE = 0.02
-"""Voltages that differ by less than this share of the largest are one: labels at two temperatures differ a little."""
 MATERIAL_FACTORS = {"friction_factor": T0, "damping_factor": C, "stiffness_factor": K}
 """Laws of the material by the column of T0, C and k that they multiply."""
 
@@ -80,12 +78,15 @@ def bingham_parameters(damper: Damper, voltage: Array | float | None, temperatur
 
 
 def rows_per_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
-    """Group base rows by voltage, lowest voltage [V] first; 0 where there is none."""
+    """Group base rows by voltage, lowest voltage [V] first; 0 where there is none.
+
+    Labels of one level scatter by as much as a constant voltage may: those at two temperatures differ a little.
+    """
     scale = max(abs(row.voltage_V or 0.0) for row in rows)
     groups: list[tuple[float, list[BaseRow]]] = []
     for row in sorted(rows, key=lambda r: (r.voltage_V or 0.0, r.temperature_degC or 0.0)):
         voltage = row.voltage_V or 0.0
-        if groups and voltage - groups[-1][0] <= _SAME_VOLTAGE * scale:
+        if groups and voltage - groups[-1][0] <= CONSTANT_SHARE * scale:
             groups[-1][1].append(row)
         else:
             groups.append((voltage, [row]))

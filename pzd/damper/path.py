@@ -21,8 +21,18 @@ from pzd.compiled import compiled, inlined
 from pzd.damper import regimes
 from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, nudged, row_of, stroke_law, stroke_slope
 from pzd.damper.element import relaxation
-from pzd.damper.flow import breakaway, relief, relief_slope, smooth_force, smooth_slope, smooth_speed
-from pzd.damper.regimes import RELIEF, SMOOTH, STICK, UNSOLVED, TimeStep, extension_speed, row_in, spring_force
+from pzd.damper.flow import breakaway, relief, relief_slope, rounded, smooth_force, smooth_slope, smooth_speed
+from pzd.damper.regimes import (
+    RELIEF,
+    SMOOTH,
+    STICK,
+    UNSOLVED,
+    TimeStep,
+    extension_speed,
+    row_in,
+    speed_at,
+    spring_force,
+)
 from pzd.record import Array
 
 DEFLECTION, SPEED = range(2)
@@ -201,7 +211,7 @@ def _march(
 def _advance_whole_step(v: Sensitivities, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
     """Advance the derivatives over a step in one regime."""
     regime, side = regimes.regime_of(spring_force(e, step.p0), step.p0)
-    w = regimes.speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
+    w = speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
     advance_sensitivities(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)
 
 
@@ -237,8 +247,9 @@ def advance(state: Array, step: TimeStep, tolerance: float, v: Sensitivities, sa
     force = abs(spring_force(e, step.p0))
     size = size_of(step)
     regime, side = regimes.regime_of(spring_force(e, step.p0), step.p0)
-    if regime != SMOOTH or abs(smooth_force(w, step.p0, side) - force) > _SAME_FORCE * force:
-        w = regimes.speed_at(force, step.p0, regime, side, w)
+    inverted = regime == SMOOTH and not rounded(step.p0)
+    if not inverted or abs(smooth_force(w, step.p0, side) - force) > _SAME_FORCE * force:
+        w = speed_at(force, step.p0, regime, side, w)
     for _ in range(_MOST_PIECES):
         dt = min(dt, step.h - at)
         if at < turn * (1.0 - _REST):
@@ -255,7 +266,7 @@ def advance(state: Array, step: TimeStep, tolerance: float, v: Sensitivities, sa
             end, speed, error = regimes.piece(e, w, at, dt, regime, side, step)
             p = row_in(step, at + dt)
             end, following, onto = regimes.onto_edge(end, p, regime, side, way)
-            speed = regimes.speed_at(abs(spring_force(end, p)), p, following, onto, speed)
+            speed = speed_at(abs(spring_force(end, p)), p, following, onto, speed)
         if v.deflection.size > 0:
             advance_sensitivities(v, e, end, w, speed, at, dt, regime, side, step, sample)
         e, w = end, speed
@@ -413,16 +424,20 @@ def _w_derivatives(
     if regime == STICK:
         found[:] = 0.0
         return
-    rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
-    found[0] = p[K] * stroke_slope(e, side, p) / rise
     pull, edge = side * p[K] * stroke_law(e, side, p), 0.0
+    rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, pull, p, side)
+    found[0] = p[K] * stroke_slope(e, side, p) / rise
     if regime == RELIEF:
         edge = smooth_speed(relief(p, side), p, side, w)
-    curve = _curve(w, p, edge, regime, side)
+    by_speed = rounded(p)
+    curve = 0.0 if by_speed else _curve(w, p, edge, regime, side)
     for c in range(v.columns.size):
         q = nudged(p, v.columns[c], v.nudges[c])
         if K <= v.columns[c] < FLOW:
             change = side * q[K] * stroke_law(e, side, q) - pull
+        elif by_speed:  # the curve gives the speed at a force, and no force at a speed
+            shift = breakaway(q, side) - breakaway(p, side)  # below the breakaway force no speed would show it
+            change = rise * (speed_at(pull + shift, q, regime, side, w) - w) - shift
         else:
             change = curve - _curve(w, q, edge, regime, side)
         v.partial[c] = -side * change / (rise * v.nudges[c])
@@ -446,7 +461,7 @@ def _curve(w: float, p: Row, edge: float, regime: int, side: float) -> float:
     """
     if regime == RELIEF:
         opens = relief(p, side)
-        edge -= (smooth_force(edge, p, side) - opens) / smooth_slope(edge, p, side)
+        edge -= (smooth_force(edge, p, side) - opens) / smooth_slope(edge, opens, p, side)
         return opens + relief_slope(p, side) * (w - edge)
     return smooth_force(w, p, side)
 

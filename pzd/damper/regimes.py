@@ -103,6 +103,8 @@ _GAUSS = (
     (0.96028985649753623, 0.10122853629037626),
 )
 """Points and weights of Gauss and Legendre's rule of eight points on (-1, 1), those above 0."""
+_PANELS = 32
+"""Parts of the deflection that each have them: in a joint with play the extension bends sharply."""
 
 
 @compiled
@@ -130,10 +132,12 @@ def spring_energy(e: float, p: Row, k: float) -> float:
         return 0.5 * k * extension * extension
     side = 1.0 if e >= 0.0 else -1.0
     start = kernels.stroke_inverse(0.0, side, p)
-    middle, half, area = 0.5 * (e + start), 0.5 * (e - start), 0.0
-    for point, weight in _GAUSS:
-        low, high = middle - half * point, middle + half * point
-        area += weight * (kernels.stroke_law(high, side, p) + kernels.stroke_law(low, side, p))
+    half, area = 0.5 * (e - start) / _PANELS, 0.0
+    for i in range(_PANELS):
+        middle = start + (2.0 * i + 1.0) * half
+        for point, weight in _GAUSS:
+            low, high = middle - half * point, middle + half * point
+            area += weight * (kernels.stroke_law(high, side, p) + kernels.stroke_law(low, side, p))
     return k * half * area
 
 
@@ -317,7 +321,8 @@ def _slopes(
     """Compute the derivatives of the rate of the integrated variable by itself and by time."""
     p = row_in(step, at)
     if explicit:
-        rise = flow.relief_slope(p, side) if regime == RELIEF else flow.smooth_slope(w, p, side)
+        force = side * p[K] * kernels.stroke_law(y, side, p)
+        rise = flow.relief_slope(p, side) if regime == RELIEF else flow.smooth_slope(w, force, p, side)
         by_y = -p[K] * kernels.stroke_slope(y, side, p) / rise
     else:
         nudge = _NUDGE * max(y, p[K] * 1e-9)

@@ -15,7 +15,6 @@ import numpy as np
 
 from pzd.artefacts import Prediction
 from pzd.damper.effects import library
-from pzd.damper.model import against_nature
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
@@ -134,7 +133,7 @@ def _without_impossible(selection: Selection, forced: Sequence[str]) -> tuple[Se
     One with a rival stays: there the verdict is `ambiguous`, and what is adopted is the best of several.
     """
     kept = selection
-    while odd := [] if kept.rivals else [name for name in against_nature(kept.fitted.damper) if name not in forced]:
+    while odd := [] if kept.rivals else [name for name in kept.fitted.unphysical if name not in forced]:
         kept = _without_effect(kept, odd[-1], IMPOSSIBLE)
     if kept.adopted or kept is selection:
         return kept, None
@@ -187,7 +186,7 @@ def _without_effect(selection: Selection, effect: str, reason: str = WORSENS_PRE
     """Remove one effect for a reason and refit the rest."""
     fewer = selection.fitted.damper.without_effects(effect)
     reasons = {**selection.reasons, effect: reason}
-    if not fewer.effects:
+    if not {*fewer.effects} - {*selection.final_evidence.whole.law}:
         return _plain(selection, reasons)
     evidence = evidence_of(selection.final_evidence.campaign, fewer)
     return replace(
@@ -319,7 +318,7 @@ def by_criterion_if_better(adoption: Adoption, validation: CrossValidation, forc
     found = None
     if gap_with_nuisances(checks) >= validation.visible:
         found = validation.fit_by_criterion(damper, validation.no_samples)
-    if found is None or first_undetermined(*found, forced) or set(against_nature(found[1].damper)) - {*forced}:
+    if found is None or first_undetermined(*found, forced) or set(found[1].unphysical) - {*forced}:
         return adoption
     error = validation.error_by_criterion(damper)
     between = validation.interpolation_error(damper, by_criterion=True)

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pzd.damper.effect import Scales
+from pzd.damper.effect import NODE_VOLTAGES, Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import nearest_condition
 from pzd.diagnosis.config import DiagnoseConfig
@@ -20,7 +20,7 @@ from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, S
 from pzd.diagnosis.fit.least_squares import FitResult
 from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force, weighed_by_noise, with_nuisances
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
-from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem
+from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem, law_of
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
 from pzd.fit.spread import estimated_spread, nuisance_equations
@@ -43,6 +43,8 @@ class Campaign:
     """Records that are simulated at the same time."""
     budget: Budget = field(default_factory=Budget, repr=False)
     """Counts the simulations of fits, and limits them."""
+    law: tuple[str, ...] = ()
+    """What of a damper belongs to the law of its element beside T0 + C w, see `Problem.law`."""
     _predictions: dict[tuple[str, int], PredictedForce] = field(default_factory=dict, repr=False)
     _checks: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 
@@ -171,8 +173,9 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
         damper.base,
         _scales(by_noise, prepared, damper),
         reference,
-        frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values),
+        frozenset(name for name, values in damper.effects.items() if NODE_VOLTAGES in values),
         campaign.budget,
+        law=law_of(damper, campaign.law),
     )
     nuisance = _shown_by_tests(problem, damper, campaign.nuisance)
     made: dict[tuple[int, bytes], WeightedRecord | None] = {}

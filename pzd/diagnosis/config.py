@@ -6,6 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from pzd.damper.effect import ELEMENT
 from pzd.damper.effects import library
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.schema.model import Frozen, nearest
 from pzd.signals.measures import SIGNIFICANCE, VISIBLE
 from pzd.signals.nuisance import NuisanceConfig
@@ -37,14 +38,16 @@ class ChangesConfig(Frozen):
     """What `pzd changes --over` lets pass."""
 
     tolerance: dict[str, tuple[float, float]] = Field(default_factory=dict)
-    """Smallest and largest value by quantity: `T0`, `C`, `k`, or effect and parameter as in `gas_spring.k_g`."""
+    """Smallest and largest value by quantity: `T0`, `C`, `k`, or effect and parameter as in `gas_spring.k_g`, or of the
+    knee law, as `knee.F_reb`."""
     peak_force: tuple[PeakForceBand, ...] = ()
     """Points of a master curve of peak force over peak velocity, each with a band."""
 
     @field_validator("tolerance")
     @classmethod
     def _known_quantities(cls, tolerance: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        known = {*ELEMENT, *(f"{e.name}.{p.name}" for e in library().values() for p in e.parameters)}
+        effects = [*library().values(), *fitted_laws().values()]
+        known = {*ELEMENT, *(f"{e.name}.{p.name}" for e in effects for p in e.parameters)}
         for name, limits in tolerance.items():
             if name not in known:
                 near = nearest(name, known)

@@ -411,7 +411,7 @@ class CrossValidation(Folds):
             if reduced is None or found is None:
                 return found
             fewer = damper.without_effects(*_not_shown(reduced, found))
-            if damper.effects and not fewer.effects:
+            if len(fewer.effects) < len(damper.effects) and not {*fewer.effects} - {*reduced.law}:
                 return plain(held_out)  # what identify would hand on: no other weights may make it better or worse
             return found if len(fewer.effects) == len(damper.effects) else _refitted(reduced, fewer)
 
@@ -483,9 +483,10 @@ def _not_shown(problem: Problem, damper: Damper) -> list[str]:
     def shown(name: str) -> bool:
         without = np.concatenate(residuals_of(problem.observations, damper.without_effects(name)))
         penalty = np.log(whole.size)
-        return bool(without @ without - whole @ whole >= len(problem.unknowns((name,))) * penalty)
+        more = len(problem.unknowns((name,))) - len(problem.unknowns(()))
+        return bool(without @ without - whole @ whole >= more * penalty)
 
-    return [name for name in damper.effects if not shown(name)]
+    return [name for name in damper.effects if name not in problem.law and not shown(name)]
 
 
 def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) -> CrossValidation:
@@ -499,6 +500,6 @@ def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) ->
     """
     prepared = campaign.prepared
     everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
-    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.budget)
+    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.budget, campaign.law)
     folds = assign_folds(prepared, baseline)
     return CrossValidation(folds.groups, folds.voltages, folds.folds, folds.lone, whole, baseline, visible)

@@ -34,6 +34,10 @@ CYCLES = 2
 """Cycles that are simulated; the last is compared."""
 MANY_CYCLES = "ten"
 """Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
+MANY = 10
+"""The same in figures."""
+SAME_TEST = 0.05
+"""Share by which frequency, amplitude or control signal of a test may be off, and it is the one that was asked for."""
 STEPS_HZ = 4.0
 """Changes of the voltage per cycle in the test that steps it."""
 SMALLEST_AMPLITUDE = 0.02
@@ -146,26 +150,49 @@ def separating_test(
     return best[1].model_copy(update={"separates": names, "distance_percent": round(100.0 * best[0], 3)})
 
 
-def repeated_longest_test(recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope) -> NextTest:
+def repeated_longest_test(
+    recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope, moving: Sequence[str] = ()
+) -> NextTest | None:
     """Propose one more test: a sine of many cycles as fast as the stand can, with the stroke of the longest record.
+
+    Or of the next longest, where that was run already; at the control signal of that record.
 
     Parameters
     ----------
     recorded : records, their displacement as recorded
     envelope : limits of a test
+    moving : effects that show where the control signal moves alone: it then steps between the outermost levels
+
+    Returns
+    -------
+    None where all these were run
     """
-    record = max(recorded, key=lambda p: float(np.ptp(p.record.time))).record
-    amplitude = min(0.5 * float(np.ptp(record.displacement)), envelope.amplitude)
-    frequency = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
-    return NextTest(
-        waveform=f"sine, {MANY_CYCLES} cycles",
-        frequency_Hz=frequency,
-        amplitude_m=rounded_down(amplitude),
-        middle_m=envelope.middle,
-        voltage_V=record.median_voltage(),
-        separates=(),
-        peak_speed_m_per_s=float(2.0 * np.pi * frequency * rounded_down(amplitude)),
-    )
+    for each in sorted(recorded, key=lambda p: -float(np.ptp(p.record.time))):
+        amplitude = min(0.5 * float(np.ptp(each.record.displacement)), envelope.amplitude)
+        frequency = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
+        voltage = each.record.median_voltage()
+        stepped = bool(moving) and len(envelope.voltages) > 1
+        if stepped or not any(_was_run(test, frequency, amplitude, voltage) for test in recorded):
+            return NextTest(
+                waveform="sine, voltage stepped" if stepped else f"sine, {MANY_CYCLES} cycles",
+                frequency_Hz=frequency,
+                amplitude_m=rounded_down(amplitude),
+                middle_m=envelope.middle,
+                voltage_V=(envelope.voltages[0], envelope.voltages[-1]) if stepped else voltage,
+                separates=tuple(moving) if stepped else (),
+                peak_speed_m_per_s=float(2.0 * np.pi * frequency * rounded_down(amplitude)),
+            )
+    return None
+
+
+def _was_run(test: PreparedRecord, frequency: float, amplitude: float, voltage: float | None) -> bool:
+    """Whether a test repeats a motion of that frequency [Hz] and amplitude [m] many times, at that control signal."""
+    if test.cycles is None or test.cycles.count < MANY or not test.constant:
+        return False
+    level = test.record.median_voltage()
+    pairs = [(1.0 / test.cycles.period, frequency), (0.5 * float(np.ptp(test.record.displacement)), amplitude)]
+    pairs += [(level, voltage)] if level is not None and voltage is not None else []
+    return all(math.isclose(one, other, rel_tol=SAME_TEST) for one, other in pairs)
 
 
 def _candidate_tests(envelope: OperatingEnvelope, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:

@@ -351,13 +351,13 @@ def compare_with_peers(rig: Rig, identified: Identified, diagnosed: Diagnosed, s
 
     Raises
     ------
-    ConfigError : when the element follows the knee law, for which diagnose holds no test out
+    ConfigError : when the element follows the knee law, beside which no peer is fitted
     DataError : when there is too little to hold a test out at a constant voltage
     """
     if identified.knees.law_of(setting) == "knee":
         raise ConfigError(
-            "identify.law: under the knee law diagnose keeps no test back that peers could be compared on; "
-            "2-identify/kept_back.csv has what both laws predict; say bingham"
+            "identify.law: peers are compared with Bingham's law and what diagnose finds beside it, and not with the "
+            "knee law; 2-identify/kept_back.csv has what both laws predict; say bingham"
         )
     prediction = diagnosed.diagnosis.prediction
     controlled = any(row.voltage_V is not None for row in identified.rows if row.setting == setting)

@@ -23,7 +23,7 @@ import numpy as np
 from pzd.damper.compose import respond
 from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.effects import library
-from pzd.damper.model import Damper, against_nature
+from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
@@ -146,7 +146,7 @@ class PredictiveSearch:
             better.remove(tried_on)
             damper = tried_on.proposal.fitted.damper
             found = self.validation.fit_by_criterion(damper, self.validation.no_samples)
-            new = {*damper.effects} - {*current.fitted.effects}
+            new = {*tried_on.proposal.fitted.effects} - {*current.fitted.effects}
             # A candidate is fitted in a few evaluations: at its optimum it may be two forces of any size that cancel.
             cancelled = new & {name for pair in cancelling(*found) for name in pair} if found and new else set()
             self.off |= cancelled
@@ -185,14 +185,14 @@ class PredictiveSearch:
         if len(fitted.effects) >= self.most_effects and not for_several:
             return []
         bent = () if for_several else self.bent
-        barred = (*fitted.effects, *self.config.forbid, *self.off, *bent, *barred)
+        barred = (*fitted.effects, *problem.law, *self.config.forbid, *self.off, *bent, *barred)
         new = [
             effect
             for effect in library().values()
             if effect.name not in barred
             and effect.asked_last == asked_last
             and not effect.needs_displacement_zero
-            and testable(problem, effect)
+            and testable(problem, fitted, effect)
         ]
         promises = most_promising(problem, fitted, new, self.reached, self.validation.campaign.jobs)
         found: list[Candidate] = []
@@ -234,7 +234,7 @@ class PredictiveSearch:
         """
 
         def proposal(each: Candidate) -> _Proposal | None:
-            if not self._moves_force(each) or against_nature(each.fitted.damper):
+            if not self._moves_force(each) or each.fitted.unphysical:
                 return None
             own = problem_for(problem, library()[each.effect])  # it may have fewer base rows
             own = replace(own, per_voltage=own.per_voltage | ({each.effect} if each.varies else set()))
@@ -403,7 +403,7 @@ def without_off(current: CriterionFit, validation: CrossValidation, forced: Sequ
 
 def _removable(fitted: FitResult) -> list[str]:
     """Return the effects whose strength may as well be zero, or with impossible values."""
-    shown, odd = showing(fitted), against_nature(fitted.damper)
+    shown, odd = showing(fitted), fitted.unphysical
     return [name for name in fitted.effects if (name not in shown or name in odd) and len(fitted.effects) > 1]
 
 

@@ -35,8 +35,8 @@ def support_of(adoption: Adoption, validation: CrossValidation, alike: Collectio
     -------
     by effect, in the order of the damper; empty where nothing is adopted or left to fit
     """
-    damper = adoption.selection.fitted.damper
-    whole = validation.fit_by_criterion(damper, validation.no_samples) if damper.effects else None
+    damper, names = adoption.selection.fitted.damper, adoption.selection.adopted
+    whole = validation.fit_by_criterion(damper, validation.no_samples) if names else None
     plain = validation.fit_by_criterion(adoption.selection.baseline.damper, validation.no_samples) if whole else None
     if whole is None or plain is None:
         return {}
@@ -47,7 +47,7 @@ def support_of(adoption: Adoption, validation: CrossValidation, alike: Collectio
         fewer = validation.fit_by_criterion(fitted.without_effects(name), validation.no_samples)
         return None if fewer is None else validation.error_to_first_order(*fewer)
 
-    tried = zip(damper.effects, validation.campaign.parallel_map(without, damper.effects), strict=True)
+    tried = zip(names, validation.campaign.parallel_map(without, names), strict=True)
     errors = {name: error for name, error in tried if error is not None}
     nearly = nearly_others(damper, whole[0].scales.force)
     others = {**adoption.alternatives, **parts(nearly, {n: _share(own, e, total) for n, e in errors.items()})}

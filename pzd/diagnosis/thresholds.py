@@ -96,7 +96,8 @@ parameters counts as none.
 Reason: 3 % as r.m.s.: a law comes so near another one in its limit alone. Where noise makes an effect of its own size
 uncertain, two laws that it does not tell apart differ by more. Not tuned."""
 LIMIT_CASE = 0.02
-"""The same share, below which a law with fewer parameters is a rival of the adopted one, whatever the likelihood says.
+"""Share, as a mean square, by which an adopted effect's force may differ from that of a law with fewer parameters:
+it is then a rival, whatever the likelihood says.
 
 Reason: 14 % as r.m.s., about what the smoothing of a displacement makes of the corner of a play: 1 % in a swept test
 whose lash passed for a hardening frame."""
@@ -136,8 +137,8 @@ HALVES_SIGNIFICANCE = 0.001
 
 Reason: the level of `significance`; the limit on the misfit is twice the quantile of chi-square, for two halves."""
 HALVES_LOSS = 0.05
-"""Share of what an effect explains in all, within which the loss of a half with the other's values counts as agreement,
-and no wider gap there.
+"""The two halves of the tests agree where the parameters fitted to one raise the misfit of the other by less than this
+share of what the effect explains in all.
 
 Reason: of a parameter that enters linearly a fifth of its value; an effect that explains much tells halves apart by
 what gains and clocks of a stand make of it. Not tuned."""
@@ -162,8 +163,8 @@ MOST_REWEIGHTINGS = 5
 Reason: time; what swings between two optima would never end."""
 
 MUCH_WORSE = 1.5
-"""Error of a left-out voltage, or where something has no name of a held-out test, as a multiple of the baseline's, from
-which effects are not adopted.
+"""Ratio of W_s to the baseline's from which a damper with effects is refused: at a left-out voltage, or in any held-out
+test where the gap has no name.
 
 Reason: of a left-out voltage, the line between voltages misses more than any law, and with a true law, when T0 and C
 become those of the damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the
@@ -237,6 +238,12 @@ INTERPOLATION_DEPARTURE = 0.25
 Reason: a force that goes with the square of the voltage lies off by just that; with parameters on lines, and an effect
 that the tests know at each voltage, it is a few hundredths. Not tuned."""
 
+HARDLY_CLOSED = 2.0 / 3.0
+"""Share of the gap that effects leave together, above which none of them is called certain.
+
+Reason: what is missing is then mostly something else, and the nearest law of the library takes a part of anything: the
+play of a rod end made a pocket that "certainly" closed a quarter of it. Not tuned."""
+
 CERTAIN_FROM = 0.99
 """Probability from which an adopted effect is called certain; below `DOUBTFUL_BELOW` it is called open.
 
@@ -278,6 +285,12 @@ ZEROS_LEAVE = 0.7
 
 Reason: it takes half of the squares; the fit that it had bent takes the rest, or the first selection stands. Not tuned.
 """
+
+SEAL_LEAVES = 0.02
+"""Largest gap, as a share of peak, beside which the friction of a seal is tried where effects leave something.
+
+Reason: seals rub with 1 to 3 % of the peak force of a damper, and T0 takes most of it, but where the rod turns round;
+what leaves more has another cause. Not tuned."""
 
 # --- What counts as a gap, and when it contradicts a name (gap.py, verdict.py)
 

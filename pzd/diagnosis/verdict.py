@@ -1,7 +1,8 @@
 """The verdict on a damper: `named`, `ambiguous`, `none` or `unexplained`, its reason, and how sure it is.
 
 `judge` adopts what predicts held-out tests and decides; `conclude` looks for more effects where the gap has no name.
-Three cases have a verdict without a search: `insufficient_data`, no test that slips, and the knee law (`knee_verdict`).
+Three cases have a verdict without a search: `insufficient_data`, no test that slips, and a knee law that misses nothing
+visible (`knee_suffices`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
 from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.confounders import known
-from pzd.damper.model import BaseRow, Damper, against_nature
+from pzd.damper.fitted_laws.knee import mean_bleed
+from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
@@ -25,7 +27,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import polished
-from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples
+from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples, shown_force
 from pzd.diagnosis.gap import ResidualCheck, gap_with_nuisances, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
@@ -159,8 +161,9 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     change = f"{' and '.join(selection.adopted)}: {_gap_change(selection, sizes, whole, config)}"
     if chances[1] < config.significance and _gap_remains(sizes, config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
-        return Decision("unexplained", words, None)
-    odd = against_nature(selection.fitted.damper)
+        hardly = sizes[1] > thresholds.HARDLY_CLOSED * sizes[0]
+        return Decision("unexplained", words, None, alike=selection.adopted if hardly else ())
+    odd = selection.fitted.unphysical
     if odd and not selection.rivals:
         value = f"a value that no {' and no '.join(odd)} has"
         words = f"{change}; but with {value}, so that it is something that looks alike"
@@ -237,12 +240,16 @@ def _gap_change(
     config : thresholds
     """
     if sizes[0] >= config.negligible:
-        change = f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+        course = "falls" if sizes[1] < sizes[0] else "does not fall, but goes"
+        change = f"the gap {course} from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
         if whole[0] <= MOSTLY_NUISANCES * sizes[0]:
             return change
         error = f"the error falls from {_percent(whole[0])} to {_percent(whole[1])} of peak"
         return f"{error}; {change} beside what a zero, gain and delay of each test would explain"
-    moved = force_change(selection.final_evidence.whole, selection.baseline, selection.fitted)
+    # Evidence begun from another damper may simulate other parts of a record.
+    final, fits = selection.final_evidence.whole, (selection.baseline, selection.fitted)
+    plain, adopted = ([shown_force(o, each.damper) for o in final.observations] for each in fits)
+    moved = force_change(final, plain, adopted)
     return (
         f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "
         f"though the gap as a whole ({_percent(sizes[0])} of peak above the noise) does not stand out of it"
@@ -576,45 +583,43 @@ def no_slip_diagnosis(rows: Sequence[ParameterRow]) -> Diagnosis:
     )
 
 
-NOT_LOOKED_FOR = "no effect was looked for: identify.law: bingham looks for them, beside one T0 and C"
-
-
-def knee_verdict(
-    identified: Identified, setting: str | None, config: DiagnoseConfig, effects: str = NOT_LOOKED_FOR
-) -> Diagnosed:
-    """Adopt the damper with the knee law unchanged: `none` where it misses nothing visible, else `unexplained`.
-
-    Effects are fitted beside one T0 and C; under another law of the element their evidence would mean something else.
+def knee_suffices(identified: Identified, setting: str | None, config: DiagnoseConfig) -> Diagnosed | None:
+    """Adopt the damper with the knee law unchanged where it misses nothing visible; None where it does.
 
     Parameters
     ----------
     identified : with the knee law of the setting
     setting : of the rig's settings, the one in use
     config : what is visible
-    effects : what became of effects, for the reason
     """
     rows, damper = identified.knees.of(setting), identified_damper(identified, setting)
     missed = max(row.missed_share for row in rows)
-    left = f"it misses up to {missed:.1%} of peak beyond noise" if missed else "it misses nothing beyond noise"
+    if missed >= config.visible:
+        return None
+    left = f"up to {missed:.1%} of peak beyond noise, which is negligible" if missed else "nothing beyond noise"
     law = next(row for row in identified.knees.laws if row.setting == setting)
     diagnosis = Diagnosis.without_effects(
-        "unexplained" if missed >= config.visible else "none",
-        f"the knee law of 2-identify/knee.csv is handed on as it was fitted, and {left}; {law.reason}; {effects}",
-        gap=None,
+        "none", f"the knee law of 2-identify/knee.csv misses {left}, and is handed on; {law.reason}", gap=None
     )
-    parameters = tuple(map(_knee_parameters, rows))
-    return Diagnosed(diagnosis.model_copy(update={"zero_m": damper.zero_m}), damper, damper, parameters)
+    diagnosis = diagnosis.model_copy(update={"zero_m": damper.zero_m})
+    return Diagnosed(diagnosis, damper, damper, knee_parameters(rows))
+
+
+def knee_parameters(rows: Sequence[KneeRow]) -> tuple[ParameterRow, ...]:
+    """Return T0, C and k of the conditions of a damper by the knee law."""
+    return tuple(map(_knee_parameters, rows))
 
 
 def _knee_parameters(row: KneeRow) -> ParameterRow:
-    """Return T0, C (mean bleed of both directions) and k of one condition."""
+    """Return T0, C (mean bleed of both directions) and k of one condition; a friction on the rod is no T0."""
+    of_flow = row.friction_on_rod == 0.0
     shared = ("setting", "voltage_V", "temperature_degC", "k_N_per_m", "k_N_per_m_low95", "k_N_per_m_high95")
     return ParameterRow(
         **row.model_dump(include={*shared, "W_s", "rmse_N"}),
-        T0_N=row.friction_N,
-        T0_N_low95=row.friction_N_low95,
-        T0_N_high95=row.friction_N_high95,
-        C_Ns_per_m=0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m),
+        T0_N=row.friction_of_flow,
+        T0_N_low95=row.friction_N_low95 if of_flow else None,
+        T0_N_high95=row.friction_N_high95 if of_flow else None,
+        C_Ns_per_m=mean_bleed(row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m),
         C_Ns_per_m_low95=None,
         C_Ns_per_m_high95=None,
         status="ok" if row.status == "ok" else "weak: T0, C, k (2-identify/knee.csv says why)",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,13 @@ from pzd.artefacts import (
     Rig,
     Value,
     base_of,
+    identified_damper,
 )
 from pzd.artefacts.diagnosis import Verdict
-from pzd.artefacts.knee import Knees, LawRow
-from pzd.damper.effect import Parameter
+from pzd.damper.effect import NODE_VOLTAGES, Parameter
 from pzd.damper.effects import library, nameable
 from pzd.damper.effects.accumulator import EXPONENTS, other_gas
+from pzd.damper.fitted_laws import seal
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import data, next_test, thresholds
@@ -34,7 +36,7 @@ from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord
-from pzd.diagnosis.fit.least_squares import base_half_widths, fit, polished, refit, standard_errors
+from pzd.diagnosis.fit.least_squares import base_half_widths, plain_fit, polished, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
@@ -42,7 +44,7 @@ from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.predictive_search import improves
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import candidate, converged
+from pzd.diagnosis.search.candidates import candidate, converged, has_name
 from pzd.diagnosis.search.determination import first_undetermined
 from pzd.diagnosis.search.forward_selection import select_effects
 from pzd.diagnosis.support import support_of
@@ -56,7 +58,8 @@ from pzd.diagnosis.verdict import (
     insufficient_data_diagnosis,
     judge,
     knee_note,
-    knee_verdict,
+    knee_parameters,
+    knee_suffices,
     no_prediction_note,
     no_slip_diagnosis,
     nodes_note,
@@ -65,11 +68,19 @@ from pzd.diagnosis.verdict import (
     temperature_note,
     with_parts_told,
 )
+from pzd.fit.cross_validation import predicts_worse
 from pzd.fit.intervals import LEVEL
 from pzd.identification.bingham_fit import Bingham
 from pzd.identification.condition import misses, parameter_row
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.trust import PARAMETER_NAMES, ParameterEvidence, parameter_scales, stiffness_veto
+from pzd.identification.trust import (
+    NOT_CONVERGED,
+    OF_THE_MODEL,
+    PARAMETER_NAMES,
+    ParameterEvidence,
+    parameter_scales,
+    stiffness_veto,
+)
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
@@ -90,100 +101,144 @@ def diagnose_setting(
     jobs: int,
 ) -> Diagnosed:
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
-    if identified.knees.law_of(setting) == "knee":
-        knee = knee_verdict(identified, setting, diagnose)
-        if knee.diagnosis.verdict == "none" or identify.law != "auto":
-            return knee
-        # Beside T0, C and k effects are looked for, and what the knee misses may be one of them.
-        bingham = replace(identified, knees=Knees())
-        other = diagnose_setting(diagnose, identify, stand, rig, bingham, control, setting, jobs)
-        law = next(row for row in identified.knees.laws if row.setting == setting)
-        better, words = _beside_knee(other, law)
-        if not better:
-            return knee_verdict(identified, setting, diagnose, words)
-        reason = f"{other.diagnosis.reason}; {words}"
-        return replace(other, diagnosis=other.diagnosis.model_copy(update={"reason": reason}))
+    search = partial(_searched, diagnose, identify, stand, rig, control, setting, jobs)
+    rows = tuple(row for row in identified.rows if row.setting == setting)
+    if identified.knees.law_of(setting) != "knee":
+        return search(base_of(identified.rows, setting), rows).hand_on()
+    if (suffices := knee_suffices(identified, setting, diagnose)) is not None:
+        return suffices
+    law = next(row for row in identified.knees.laws if row.setting == setting)
+    bingham = search(base_of(identified.rows, setting), rows) if identify.law == "auto" else None
+    # What the knee law misses may be an effect beside T0, C and k, in whose place the knee stands.
+    if bingham is not None and bingham.verdict != "unexplained":
+        found = bingham.hand_on()
+        if _predicts_far_better(found, law.W_s_knee):
+            return _with_law(found, INSTEAD_OF_KNEE)
+    beside = search(identified_damper(identified, setting), knee_parameters(identified.knees.of(setting))).hand_on()
+    reached = beside.diagnosis.prediction
+    if bingham is not None and beside.diagnosis.verdict == "unexplained":
+        found = bingham.hand_on()
+        if _predicts_far_better(found, reached.W_s if reached else law.W_s_knee):
+            return _with_law(found, INSTEAD_OF_KNEE)
+    return _with_law(beside, f"beside the knee law of 2-identify/knee.csv; {law.reason}")
+
+
+INSTEAD_OF_KNEE = (
+    "beside one T0 and C: kept-back tests are predicted far better so than by the knee law, with less than "
+    f"{thresholds.BETTER_THAN_KNEE:.0%} of its W_s"
+)
+"""Why a damper beside T0, C and k is handed on where identify took the knee law."""
+
+
+def _with_law(diagnosed: Diagnosed, law: str) -> Diagnosed:
+    """Say in the reason beside which law of the element effects were looked for."""
+    reason = f"{diagnosed.diagnosis.reason}; this is {law}"
+    return replace(diagnosed, diagnosis=diagnosed.diagnosis.model_copy(update={"reason": reason}))
+
+
+@dataclass(frozen=True, eq=False)
+class _Searched:
+    """What a search beside one law of the element names, and what to ask for the damper that is handed on."""
+
+    verdict: Verdict
+    hand_on: Callable[[], Diagnosed]
+    """Looks for what predicts where the gap has no name, which takes longer than the naming; gives the whole."""
+
+
+def _searched(
+    diagnose: DiagnoseConfig,
+    identify: IdentifyConfig,
+    stand: RigConfig,
+    rig: Rig,
+    control: Control,
+    setting: str | None,
+    jobs: int,
+    identified: Damper,
+    rows: tuple[ParameterRow, ...],
+) -> _Searched:
+    """Search beside the damper that identify found, with T0, C and k of each condition in rows."""
     records, saturated = data.unsaturated_records(rig, setting)
     records, drift = data.without_drift(rig, records)
     recorded = data.prepare(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
     prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
     roles = data.split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
-    baseline = base_of(identified.rows, setting)
+    baseline = identified.about(zero).moved(-zero)
     prepared = with_hum(prepared, baseline)
-    campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, Budget(diagnose.most_evaluations))
-    rows = tuple(row for row in identified.rows if row.setting == setting)
-    if all(row.shows_oil_spring_alone for row in rows):
-        return Diagnosed(no_slip_diagnosis(rows), baseline, baseline, rows)
+    budget, law = Budget(diagnose.most_evaluations), tuple(baseline.effects)
+    campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, budget, law)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
+
+    def without(diagnosis: Diagnosis) -> _Searched:
+        return _Searched(diagnosis.verdict, lambda: Diagnosed(diagnosis, identified, identified, rows))
+
+    if all(row.shows_oil_spring_alone for row in rows):
+        return without(no_slip_diagnosis(rows))
     if insufficient_data(campaign):
-        return Diagnosed(insufficient_data_diagnosis(recorded, envelope), baseline, baseline, rows)
+        return without(insufficient_data_diagnosis(recorded, envelope))
     judged = _judged(campaign, baseline, diagnose, control.unit)
     judged = _with_zeros_of_tests(judged, baseline, diagnose, control.unit)
+    judged = _with_seal(judged, baseline, diagnose, control.unit)
     judged = _with_one_alone(judged, baseline, diagnose, control.unit)
-    campaign, validation = judged.campaign, judged.validation
-    adoption, decision = _concluded(judged, baseline, diagnose, control.unit)
-    adoption = by_criterion_if_better(adoption, validation, diagnose.force)
-    support = support_of(adoption, validation, decision.alike)
-    decision = with_parts_told(decision, support)
-    selection, prediction = adoption.selection, adoption.prediction(validation)
-    before = campaign.checks(selection.baseline.damper)
-    log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
-    limits = (
-        hold_out_note(roles.hold_out),
-        no_prediction_note(prediction),
-        alone_note(validation),
-        data.saturation_note(saturated),
-        data.drift_note(drift),
-    )
-    handed_on = fitted_to_all(adoption, validation, diagnose.force)
-    final = handed_on.fitted.damper.moved(zero) if selection.adopted else baseline
-    beside = knee_note(identify.law, decision.verdict, baseline.base)
-    if decision.verdict == "unexplained" and identify.nodes is None:
-        beside += nodes_note(prepared, baseline.base, control.name)
-    if "end_stop" in selection.adopted:
-        beside += one_stop_note(final, [each.record.displacement for each in recorded])
-    if "temperature_drift" not in selection.adopted:
-        beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
-    diagnosis = Diagnosis(
-        verdict=decision.verdict,
-        reason="".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before))),
-        effects=selection.adopted,
-        confidence=decision.confidence,
-        gap=held_out_gap(selection, validation if adoption.by_criterion else None),
-        parameters=parameters_of(handed_on, control),
-        prediction=prediction,
-        zero_m=final.zero_m,
-        support=support,
-        left_of_peak=visible_gap(campaign.checks(selection.fitted.damper)),
-        ranking=ranking_of(handed_on, selection.initial_evidence),
-        rivals=(*selection.rivals, *decision.possible),
-        where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=_next_test(adoption, decision, final, zero, validation, recorded, envelope),
-    )
-    if selection.adopted:
-        rows = base_parameters(handed_on, decision.verdict, setting)
-    shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
-    return Diagnosed(diagnosis, final, baseline, rows, shapes)
+
+    def hand_on() -> Diagnosed:
+        campaign, validation = judged.campaign, judged.validation
+        adoption, decision = _concluded(judged, baseline, diagnose, control.unit)
+        adoption = by_criterion_if_better(adoption, validation, diagnose.force)
+        support = support_of(adoption, validation, (*decision.alike, *_may_be_none(adoption.selection, control)))
+        decision = with_parts_told(decision, support)
+        selection, prediction = adoption.selection, adoption.prediction(validation)
+        before = campaign.checks(selection.baseline.damper)
+        log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
+        limits = (
+            hold_out_note(roles.hold_out),
+            no_prediction_note(prediction),
+            alone_note(validation),
+            data.saturation_note(saturated),
+            data.drift_note(drift),
+        )
+        handed_on = fitted_to_all(adoption, validation, diagnose.force)
+        final = handed_on.fitted.damper.moved(zero) if selection.adopted else identified
+        beside = "" if law else knee_note(identify.law, decision.verdict, baseline.base)
+        beside += _seal_note(final, law)
+        if decision.verdict == "unexplained" and identify.nodes is None:
+            beside += nodes_note(prepared, baseline.base, control.name)
+        if "end_stop" in selection.adopted:
+            beside += one_stop_note(final, [each.record.displacement for each in recorded])
+        if "temperature_drift" not in selection.adopted:
+            beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
+        diagnosis = Diagnosis(
+            verdict=decision.verdict,
+            reason="".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before))),
+            effects=selection.adopted,
+            confidence=decision.confidence,
+            gap=held_out_gap(selection, validation if adoption.by_criterion else None),
+            parameters=parameters_of(handed_on, control),
+            prediction=prediction,
+            zero_m=final.zero_m,
+            support=support,
+            left_of_peak=visible_gap(campaign.checks(selection.fitted.damper)),
+            ranking=ranking_of(handed_on, selection.initial_evidence),
+            rivals=(*selection.rivals, *decision.possible),
+            where=() if decision.verdict == "none" else regions(before, control.unit, zero),
+            next_test=_next_test(adoption, decision, final, zero, validation, recorded, envelope),
+        )
+        fitted = base_parameters(handed_on, decision.verdict, setting) if selection.adopted else rows
+        shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
+        # The gas of the law counts from the same zero in both, where it has a force besides its stiffness.
+        plain = identified.about(zero) if selection.adopted else identified
+        return Diagnosed(diagnosis, final, plain, fitted, shapes)
+
+    return _Searched(judged.conclusion[1].verdict, hand_on)
 
 
-def _beside_knee(other: Diagnosed, law: LawRow) -> tuple[bool, str]:
-    """Return whether a damper beside T0, C and k predicts kept-back tests far better than the knee law, and the words.
-
-    Parameters
-    ----------
-    other : the damper, with its prediction
-    law : of the setting, with what the knee law predicts
-    """
-    found = other.diagnosis.prediction
-    if law.W_s_knee is None or found is None or found.hold_out != "tests":
-        return False, "beside one T0 and C effects were looked for, and no kept-back test can tell"
-    if found.W_s <= thresholds.BETTER_THAN_KNEE * law.W_s_knee:
-        words = f"the knee law, which identify.law: auto took, predicts kept-back tests with W_s {law.W_s_knee:.3g}"
-        return True, f"{words}, this damper with {found.W_s:.3g}: it is handed on"
-    names = " and ".join(other.diagnosis.effects) or "no effect"
-    return False, f"one T0 and C with {names} predict kept-back tests with W_s {found.W_s:.3g}: the knee law stays"
+def _predicts_far_better(one: Diagnosed, criterion: float | None) -> bool:
+    """Whether a damper beside T0, C and k predicts whole tests kept back far better than another law with this W_s."""
+    found = one.diagnosis.prediction
+    if criterion is None or found is None or found.hold_out != "tests":
+        return False
+    return found.W_s <= thresholds.BETTER_THAN_KNEE * criterion
 
 
 def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:
@@ -248,6 +303,40 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
     return replace(again, zeros=told)
 
 
+def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+    """Judge again beside the friction of a seal on the rod, where effects leave a little that has no name.
+
+    T0 lies behind the oil spring and turns round with the flow; a seal turns round with the rod. That is no effect that
+    anybody asks for, and beside one that is missing it would leave the whole without a name. The first judgement stands
+    where the effects have none with it either, or kept-back tests are predicted worse.
+    """
+    adoption, decision = first.conclusion
+    left = visible_gap(first.campaign.checks(adoption.selection.fitted.damper))
+    if decision.verdict != "unexplained" or config.force or first.campaign.law or left > thresholds.SEAL_LEAVES:
+        return first
+    scales = adoption.selection.initial_evidence.whole.scales
+    start = {p.name: p.search.starts[0] * p.search.scale(scales) for p in seal.EFFECT.parameters}
+    rows = [row.model_copy(update={"T0_N": max(row.T0_N - start["F_s"], 0.0)}) for row in baseline.base]
+    rubbed = baseline.model_copy(update={"base": tuple(rows)}).with_effect(seal.EFFECT.name, start)
+    again = _judged(replace(first.campaign, law=(seal.EFFECT.name,)), rubbed, config, unit)
+    found, named = again.conclusion
+    if named.verdict not in ("named", "ambiguous") or predicts_worse(found.error, adoption.error):
+        return first
+    # The seal takes the place of what looked like another effect, and brings none.
+    sure = {*adoption.selection.adopted} - {*decision.alike}
+    if not {*found.selection.adopted} <= sure or not improves(found.error, adoption.baseline_error, again.validation):
+        return first
+    return replace(again, conclusion=(replace(found, baseline_error=adoption.baseline_error), named))
+
+
+def _seal_note(damper: Damper, law: Sequence[str]) -> str:
+    """Return the end of a reason that tells of a seal which the law that identify found does not have."""
+    if law or seal.EFFECT.name not in damper.effects:
+        return ""
+    rubs = damper.effects[seal.EFFECT.name]["F_s"]
+    return f"; beside the friction of a seal of {rubs:.3g} N, which turns round with the rod and is no part of T0"
+
+
 ALONE = "nothing is left with it, and nothing else explains the tests"
 
 
@@ -262,7 +351,7 @@ def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, un
         return first
     evidence, plain = adoption.selection.initial_evidence, adoption.selection.baseline
     whole = evidence.whole
-    wanted = [effect for effect in library().values() if effect.named_alone and effect.name not in config.forbid]
+    wanted = [e for e in library().values() if e.named_alone and e.name not in config.forbid and has_name(whole, e)]
     tried = [converged(whole, plain, candidate(whole, plain, effect)) for effect in wanted]
     closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
     for each in sorted(closing, key=lambda c: c.delta_bic):
@@ -380,8 +469,12 @@ def _next_test(
         offsets = [campaign.offset(damper) for _, damper in selection.rival_dampers]
         return next_test.separating_test(rivals, envelope, temperature, offsets)
     if decision.doubtful:
-        return next_test.repeated_longest_test(recorded, envelope)
-    offset = campaign.offset(final.moved(-zero) if selection.adopted else final)
+        # A hysteresis or a lag of the drive that is not excluded shows where the control signal moves alone.
+        told = [library()[name] for name in (*selection.adopted, *decision.possible) if name in library()]
+        of_drive = [effect.name for effect in told if effect.place == "drive"]
+        moving = of_drive if {*of_drive} & {*decision.possible} else ()
+        return next_test.repeated_longest_test(recorded, envelope, moving)
+    offset = campaign.offset(final.moved(-zero))
     errors = adoption.error, adoption.interpolation_error
     return next_test.intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
 
@@ -411,7 +504,7 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
                 gap_after=left,
                 gap_standard_error=error,
                 delta_bic=round(c.delta_bic, 3),
-                at_voltage_V=values.pop("at_voltage_V", None),
+                at_voltage_V=values.pop(NODE_VOLTAGES, None),
                 parameters=values,
                 reason="rival" if c.effect in selection.rivals else reason,
             )
@@ -423,8 +516,8 @@ def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str,
     """Return the parameters of the adopted effects with 95 % intervals, in units of this control signal."""
     damper, errors = selection.fitted.damper, standard_errors(selection.fitted)
     found: dict[str, dict[str, Value]] = {}
-    for name, values in damper.effects.items():
-        nodes = values.get("at_voltage_V")
+    for name in selection.adopted:
+        nodes = damper.effects[name].get(NODE_VOLTAGES)
         for parameter in library()[name].parameters:
             mine = [
                 (u.value_in(damper), float(error))
@@ -438,6 +531,13 @@ def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str,
     if {"accumulator", "preload_offset"} <= found.keys():
         found["accumulator"], found["preload_offset"] = _of_any_gas(found["accumulator"], found["preload_offset"])
     return found
+
+
+def _may_be_none(selection: Selection, control: Control) -> list[str]:
+    """Return the adopted effects whose strength, the first parameter, may be none by the interval that is told."""
+    strengths = {name: library()[name].parameters[0] for name in selection.adopted}
+    found = parameters_of(selection, control)
+    return [name for name, p in strengths.items() if found[name][p.name].may_be(p.neutral)]
 
 
 def _of_any_gas(gas: dict[str, Value], preload: dict[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
@@ -506,12 +606,10 @@ def _value(
 
 
 DOUBTS: dict[Verdict, str] = {
-    "unexplained": "something is still missed: the parameters are the model's, not the damper's",
+    "unexplained": f"something is still missed: {OF_THE_MODEL}",
     "ambiguous": "a rival effect would leave other values",
 }
 """Why no row is `ok` under a verdict."""
-NOT_CONVERGED = "the least squares have not converged"
-"""Why no row is `ok` whose fit ended before its optimum."""
 SHOWN = 1.0
 """Share of the force that a parameter moves, for its status: what the tests do not show has a wide interval here."""
 
@@ -562,7 +660,7 @@ def held_out_gap(selection: Selection, validation: CrossValidation | None = None
     validation : the tests, where the adopted damper is fitted by criterion (4); None where it is by likelihood
     """
     campaign, training = selection.initial_evidence.campaign, selection.initial_evidence.halves[0]
-    baseline = fit(training, (), training.start()).damper
+    baseline = plain_fit(training).damper
     before = held_out_criterion(campaign.held_out_checks(baseline), campaign.split)
     if not selection.adopted:
         return before

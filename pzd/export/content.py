@@ -19,6 +19,7 @@ import numpy as np
 
 from pzd.artefacts import ForceRow, InverseRow, Table
 from pzd.damper.confounders import known
+from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.model import BaseRow, Damper
 from pzd.export.drive import Drive
 from pzd.force_table.lookup import Lookup
@@ -279,7 +280,7 @@ def effect_rows(content: Content) -> tuple[EffectRow, ...]:
     """Return the parameters of the adopted effects, one row a value."""
     rows = []
     for name, given in content.damper.effects.items():
-        nodes = given.get("at_voltage_V")
+        nodes = given.get(NODE_VOLTAGES)
         for parameter in known()[name].parameters:
             value, unit = given[parameter.name], content.control.own_unit(parameter.unit)
             values = value if isinstance(value, tuple) else (value,)

@@ -398,9 +398,10 @@ class _Body:
                 return self.constant(value, node)
             case ast.Name(id=name) if name in self.kinds:
                 return _Code(_name(name), self.kinds[name])
-            case ast.Attribute(value=ast.Name(id=name), attr=attribute) if self.kinds.get(name) in self.into.structs:
-                fields = {n: k for k, n in self.into.structs[self.kinds[name]]}
-                return _Code(f"{_name(name)}.{_name(attribute)}", fields[_name(attribute)])
+            case ast.Attribute(value=ast.Call() as owner, attr=field_name):
+                return self.field_of(self.expression(owner), field_name, node)
+            case ast.Attribute(value=ast.Name(id=name) as owner, attr=field_name) if name in self.kinds:
+                return self.field_of(self.expression(owner), field_name, node)
             case ast.Name() | ast.Attribute():
                 return self.constant(self.found(node), node)
             case ast.Subscript(value=value, slice=index):
@@ -430,6 +431,13 @@ class _Body:
                 return _Code(f"({kind}){{{', '.join(one.text for one in entries)}}}", kind)
             case _:
                 raise self.refused(where or node, ast.unparse(node))
+
+    def field_of(self, owner: _Code, name: str, node: ast.expr) -> _Code:
+        """Translate a field of a structure."""
+        kinds = {field_name: kind for kind, field_name in self.into.structs.get(owner.kind, ())}
+        if _name(name) not in kinds:
+            raise self.refused(node, ast.unparse(node))
+        return _Code(f"{owner.within(_CALL)}.{_name(name)}", kinds[_name(name)])
 
     def found(self, node: ast.expr) -> Any:
         """Return what a name that is not of the function stands for."""

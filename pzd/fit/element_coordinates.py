@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.damper.element import STIFFEST
 from pzd.record import Array
 
 HARDLY_DAMPING = 1e-4
@@ -65,9 +66,9 @@ class ElementCoordinates:
         )
 
     def from_search(self, x: Array) -> tuple[float, float, float]:
-        """Return T0 [N], C [N s/m] and k [N/m] at coordinates (3,)."""
+        """Return T0 [N], C [N s/m] and k [N/m] at coordinates (3,); k infinite where nothing tells it from rigid."""
         compliance = self._compliance * float(np.sinh(x[2]))
-        stiffness = 1.0 / compliance if compliance > 0.0 else np.inf
+        stiffness = 1.0 / compliance if compliance > 1.0 / STIFFEST else np.inf
         return self._largest_friction(compliance) * float(x[0]), self._damping * float(np.sinh(x[1])), stiffness
 
     def _largest_friction(self, compliance: float) -> float:

@@ -106,7 +106,8 @@ def minimise(
     ----------
     residuals : gives (n,) at variables (p,)
     start : (p,); moved inside the limits
-    jacobian : gives (n, p) at variables (p,); by three-point differences where there is none
+    jacobian : gives (n, p) at variables (p,), what is not finite counts as 0; by three-point differences where there
+        is none
     bounds : (p,) least and (p,) largest values of the variables
     precision : relative change at which the search ends
     evaluations : of the residuals, at most
@@ -125,11 +126,12 @@ def minimise(
         left = np.asarray(residuals(start), dtype=np.float64)
         limits = _Limits(low, high, largest_offset, resolution, size or left.size)
         return _judged(start, left, np.zeros((left.size, 0)), limits, 1)
-    slopes: Any = jacobian or "3-point"
+    slopes = None if jacobian is None else _finite(jacobian)
+    way: Any = slopes or "3-point"
     found = least_squares(
         residuals,
         np.clip(start, low, high),
-        jac=slopes,
+        jac=way,
         bounds=(low, high),
         x_scale="jac",
         ftol=precision,
@@ -139,7 +141,7 @@ def minimise(
     )
     limits = _Limits(low, high, largest_offset, resolution, found.fun.size if size is None else size)
     best = _judged(found.x, found.fun, np.asarray(found.jac), limits, int(found.nfev))
-    if jacobian is None or found.status <= 0:
+    if slopes is None or found.status <= 0:
         return best
     for _ in range(MOST_CLOSING_STEPS):
         if best.converged or best.undetermined or best.at_limit.any():
@@ -147,12 +149,17 @@ def minimise(
         x = best.x - np.linalg.lstsq(best.jacobian, best.residuals, rcond=None)[0]
         if not np.all((low < x) & (x < high)):
             break
-        nearer = _judged(x, residuals(x), jacobian(x), limits, best.evaluations + 1)
+        nearer = _judged(x, residuals(x), slopes(x), limits, best.evaluations + 1)
         grows = nearer.sum_of_squares > best.sum_of_squares * (1.0 + ROUNDING)
         if grows or not nearer.offset < best.offset:
             break
         best = nearer
     return best
+
+
+def _finite(jacobian: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Return derivatives in which a sample without a slope, as where a law of the flow is vertical, has no say."""
+    return lambda x: np.nan_to_num(jacobian(x), posinf=0.0, neginf=0.0)
 
 
 def minimise_from(starts: Iterable[Array], search: Callable[[Array], Optimum]) -> Optimum:

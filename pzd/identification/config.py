@@ -37,9 +37,9 @@ class IdentifyConfig(Frozen):
 
     law: Literal["bingham", "knee", "auto"] = "bingham"
     """Which damper is handed on. `bingham`: one T0 and C, what it lacks is named by diagnose. `knee`, for passive road
-    and race dampers: bleed, knee and blow-off of rebound and of compression, with seal friction and gas; diagnose then
-    looks for nothing more. `auto`: `knee` where it predicts whole tests kept back better beyond chance; where it misses
-    something, and effects beside one T0 and C predict them far better still, diagnose hands on these."""
+    and race dampers: bleed, knee and blow-off of rebound and of compression, with seal friction and gas; what it misses
+    is named by diagnose too. `auto`: `knee` where it predicts whole tests kept back better beyond chance; where effects
+    beside one T0 and C predict them far better still, diagnose hands on these."""
     method: Literal["separable", "evolutionary"] = "separable"
     """`separable`: grid and least squares with the stiffness solved linearly; `evolutionary`: as the paper's
     genetic algorithm. Both minimise the same criterion (4)."""

@@ -15,6 +15,7 @@ from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, Parame
 from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
+from pzd.damper.model import Damper
 from pzd.fit.cross_validation import (
     FEWEST_TESTS,
     PredictionError,
@@ -25,23 +26,25 @@ from pzd.fit.cross_validation import (
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths, interval_columns, label_columns
 from pzd.identification.knee_fit import (
+    DESCRIBES,
     GAS_FORCE,
     GAS_SPRING,
+    KneeCurve,
     KneeData,
     KneeFit,
     fit_bingham,
-    fit_knee,
+    fit_knees,
     held_out_errors,
     without_gas,
 )
 from pzd.identification.prepared_record import fitted_records, prepare, split_by_record
-from pzd.identification.trust import WEAK_WIDTH, Misfit, friction_scale, misfit_of
+from pzd.identification.trust import NOT_CONVERGED, OF_THE_MODEL, WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
-from pzd.record import SAME_TEMPERATURE, Condition, Labels
+from pzd.record import SAME_TEMPERATURE, Condition, Labels, Record
 from pzd.schema.errors import ConfigError
 from pzd.signals.measures import VISIBLE, rms
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import NO_NUISANCE, NuisanceConfig
 from pzd.signals.segmentation import separate_tests
 
 log = logging.getLogger(__name__)
@@ -72,14 +75,18 @@ def identify_knees(
     ------
     ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
     """
-    fitted: list[FittedCondition] = []
-    for number, (condition, bingham) in enumerate(conditions, start=1):
-        tests = KneeData.of([test for record in condition.records for test in separate_tests(record)])
-        fit = fit_knee(tests, bingham.k_N_per_m or bingham.k_N_per_m_low95 or STIFF)
-        fitted.append(FittedCondition.of(condition.labels, tests, fit, config.nuisance))
-        progress(Progress(number, len(conditions), f"knee law: {_knee_text(fitted[-1].row)}"))
-    for setting in dict.fromkeys(each.row.setting for each in fitted):
-        fitted = _with_gas_that_shows(fitted, setting, config.nuisance)
+    by_setting: dict[str | None, list[FittedCondition]] = {}
+    for setting in dict.fromkeys(condition.labels[0] for condition, _ in conditions):
+        of_setting = [
+            (condition.labels, [test for record in condition.records for test in separate_tests(record)], _start(row))
+            for condition, row in conditions
+            if condition.labels[0] == setting
+        ]
+        by_setting[setting] = _with_gas_that_shows(_fitted(of_setting, config.nuisance), config.nuisance)
+        done = sum(map(len, by_setting.values()))
+        for number, each in enumerate(by_setting[setting], start=done - len(of_setting) + 1):
+            progress(Progress(number, len(conditions), f"knee law: {_knee_text(each.row)}"))
+    fitted = [each for mine in by_setting.values() for each in mine]
     rows = [each.row for each in fitted]
     forces = [force for row in rows for force in knee_forces(row)]
     found, described = [], []
@@ -118,22 +125,41 @@ class FittedCondition:
         return cls(labels, tests, fit, knee_row(labels, tests, fit, nuisance))
 
 
-def _with_gas_that_shows(
-    fitted: Sequence[FittedCondition], setting: str | None, nuisance: NuisanceConfig
-) -> list[FittedCondition]:
+TestsOfCondition = tuple[Labels, Sequence[Record], float]
+"""Labels and tests of a condition, and the stiffness of the oil spring at which the search begins [N/m]."""
+
+
+def fitted_knee_damper(conditions: Sequence[TestsOfCondition]) -> Damper:
+    """Fit the knee law to the tests of some conditions, and return the damper with it."""
+    return knee_damper([each.row for each in _fitted(conditions, NO_NUISANCE)])
+
+
+def _fitted(conditions: Sequence[TestsOfCondition], nuisance: NuisanceConfig) -> list[FittedCondition]:
+    """Fit the knee law to the conditions of one damper."""
+    tests = [KneeData.of(records) for _, records, _ in conditions]
+    fits = fit_knees([(data, stiffness) for data, (_, _, stiffness) in zip(tests, conditions, strict=True)])
+    return [
+        FittedCondition.of(labels, data, fit, nuisance)
+        for (labels, _, _), data, fit in zip(conditions, tests, fits, strict=True)
+    ]
+
+
+def _start(bingham: ParameterRow) -> float:
+    """Return the stiffness of the oil spring at which the search begins [N/m]."""
+    return bingham.k_N_per_m or bingham.k_N_per_m_low95 or STIFF
+
+
+def _with_gas_that_shows(fitted: Sequence[FittedCondition], nuisance: NuisanceConfig) -> list[FittedCondition]:
     """Leave gas spring and gas force of a setting out where the interval of each of its conditions holds zero.
 
     One after the other, each time with all else fitted again: what is taken out of a joint fit moves the rest.
     """
     fitted = list(fitted)
-    mine = [i for i, each in enumerate(fitted) if each.row.setting == setting]
     for term in (GAS_SPRING, GAS_FORCE):
-        if any(_excludes_zero(fitted[i].row, GAS_COLUMNS[term]) for i in mine):
+        if any(_excludes_zero(each.row, GAS_COLUMNS[term]) for each in fitted):
             continue
-        for i in mine:
-            each = fitted[i]
-            fit = without_gas(each.tests, each.fit, term)
-            fitted[i] = FittedCondition.of(each.labels, each.tests, fit, nuisance)
+        fits = [without_gas(each.tests, each.fit, term) for each in fitted]
+        fitted = [FittedCondition.of(e.labels, e.tests, fit, nuisance) for e, fit in zip(fitted, fits, strict=True)]
     return fitted
 
 
@@ -187,14 +213,18 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
     values["k_N_per_m"] = curve.stiffness
     bent = ["friction_N"]  # what may be none
     for way, direction in enumerate(DIRECTIONS):
-        bleed, square, *of_knee = (f"{direction}_{column}" for column in OF_A_DIRECTION)
+        bleed, square, *of_knee, spread = (f"{direction}_{column}" for column in OF_A_DIRECTION)
         values[bleed] = curve.bleed[way]
         if fit.form.has_square[way]:
             values[square] = curve.square[way]
             bent.append(bleed)
         if fit.form.has_knee[way]:
-            shape = curve.knee_force(way), curve.knee_speed[way], curve.blow_off[way]
+            shape = _force_of_knee(curve, way), curve.knee_speed[way], curve.blow_off[way]
             values |= zip(of_knee, shape, strict=True)
+        if fit.form.has_round_knee[way]:
+            values[spread] = curve.spread[way]
+    if curve.seal_speed is not None:
+        values["seal_m_per_s"] = curve.seal_speed
     cells: dict[str, float | None] = {}
     for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
         nonnegative = name in bent or "square" in name
@@ -214,6 +244,11 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
             "status": _status(values, widths, fit, misfit, tests),
         }
     )
+
+
+def _force_of_knee(curve: KneeCurve, way: int) -> float:
+    """Return the force at a knee with all friction [N], of the flow or on the rod."""
+    return curve.knee_force(way) + curve.friction - curve.friction_of_flow
 
 
 def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
@@ -247,6 +282,8 @@ def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tup
     for way in form.directions_with_knee:
         columns += [f"{DIRECTIONS[way]}_knee_velocity_m_per_s", f"{DIRECTIONS[way]}_blow_off_Ns_per_m"]
     columns += [f"{DIRECTIONS[way]}_bleed_square_Ns2_per_m2" for way in form.directions_with_square]
+    columns += [f"{DIRECTIONS[way]}_knee_spread_N" for way in form.directions_with_round_knee]
+    columns += ["seal_m_per_s"] * form.has_seal
     columns += [GAS_COLUMNS[term] for term in form.gas_terms]
     by_force, forces = fit.slopes.copy(), list(columns)
     for way in form.directions_with_knee:
@@ -283,13 +320,17 @@ def _quantity_name(column: str) -> str:
     return column.removesuffix(unit).replace("_", " ")
 
 
+UNJUDGED = ("gas_spring_N_per_m", "seal_m_per_s")
+"""Columns that make no status weak: a spring of the gas may be next to none, as may the speed of a seal."""
+
+
 def _status(
     values: Mapping[str, float], widths: Mapping[str, float], fit: KneeFit, misfit: Misfit, tests: KneeData
 ) -> str:
     """Return `ok`, or the weak parameters with the reason.
 
     The gas is judged against the scale of the friction, both parts of a bleed against its force at the knee, or at the
-    largest speed without one: either may be next to none.
+    largest speed without one: either may be next to none. The spread of a knee is judged against its force.
     """
     least = {"friction_N": friction_scale(values["friction_N"], rms(tests.measured))}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
@@ -298,23 +339,22 @@ def _status(
         w = min(fit.curve.knee_speed[way], tests.fastest)
         least[bleed] = values[bleed] + values[square] * w
         least[square] = least[bleed] / w
+    for way in fit.form.directions_with_round_knee:
+        _, _, knee_force, _, _, spread = (f"{DIRECTIONS[way]}_{column}" for column in OF_A_DIRECTION)
+        least[spread] = values[knee_force]
     weak = [
         f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
-        if name != "gas_spring_N_per_m" and widths.get(name, 0.0) > WEAK_WIDTH * least.get(name, value)
+        if name not in UNJUDGED and widths.get(name, 0.0) > WEAK_WIDTH * least.get(name, value)
     ]
     if not fit.converged:
-        weak.append("the least squares have not converged")
+        weak.append(NOT_CONVERGED)
     if misfit.is_large:
-        weak.append(f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+        weak.append(f"the law misses {misfit.share:.1%} of peak: {OF_THE_MODEL}")
     return f"weak: {'; '.join(weak)}" if weak else "ok"
 
 
 # --- Choice of the law by held-out tests ---
-
-DESCRIBES = 0.25
-"""Most of the W_s of Bingham's law that the knee law may leave where tests kept back do not decide: half the error. Not
-tuned; a law with more numbers than a damper needs takes a few percent of what is left."""
 
 HeldOutLaws = tuple[PredictedRow, tuple[float, ...], tuple[float, ...]]
 """A held-out test: its row, and the entry of a `PredictionError` of Bingham's and of the knee law."""

@@ -1,7 +1,8 @@
 """Least-squares fit of the knee law: criterion (4) over the tests of a condition, gas force and spring profiled out.
 
-Equation: |F| = T0 + C w + q w^2 up to the speed w_k of the knee, then F(w_k) + B (w - w_k); C, q, w_k and B of each
-direction
+Equation: |F| = T0 + C w + q w^2 up to the speed w_k of the knee, then F(w_k) + B (w - w_k), a corner that is
+round where the valve opens over forces of a spread s; C, q, w_k, B and s of each direction. The friction T0 is that of
+the flow, behind the oil spring k, or T0 tanh(v/v_s) of a seal on the rod beside it.
                                         Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
 """
 
@@ -16,15 +17,16 @@ from typing import NamedTuple
 import numpy as np
 
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compose import integrated_force, integrated_sensitivities, sampling_steps
-from pzd.damper.fitted_laws.knee import NO_KNEE
+from pzd.damper.compose import integrated_force, integrated_sensitivities, parallel_force_along, sampling_steps
+from pzd.damper.fitted_laws.knee import mean_bleed, parameters_of
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
 from pzd.damper.path import Variables
 from pzd.fit.cross_validation import PredictionError, folds_in_turn, log_ratios, squared_sums
 from pzd.fit.least_squares import minimise
 from pzd.identification.prepared_record import in_motion
-from pzd.record import Array, Mask, Record, mid_stroke
+from pzd.record import Array, Mask, Record, mid_stroke, sliced
+from pzd.signals.cycles import cycles_of
 from pzd.signals.kinematics import clean_displacement_of
 from pzd.signals.measures import VISIBLE, criterion, rms
 
@@ -51,35 +53,44 @@ class KneeCurve(NamedTuple):
     """B [N s/m]; equal to the bleed without a knee."""
     square: tuple[float, float] = (0.0, 0.0)
     """q [N s2/m2]; 0 where the bleed is straight."""
+    spread: tuple[float, float] = (0.0, 0.0)
+    """s [N]; 0 where the knee is sharp."""
+    seal_speed: float | None = None
+    """v_s [m/s] of a friction on the rod; None for one of the flow."""
 
     def knee_force(self, direction: int) -> float:
-        """Return the force at the knee of one direction [N]; infinite without a knee."""
+        """Return the force of one direction where bleed and blow-off meet [N]; infinite without a knee."""
         speed = self.knee_speed[direction]
         bent = self.square[direction] * speed**2 if self.square[direction] else 0.0
-        return self.friction + self.bleed[direction] * speed + bent
+        return self.friction_of_flow + self.bleed[direction] * speed + bent
+
+    @property
+    def friction_of_flow(self) -> float:
+        """T0 of the element [N]: none where the friction is on the rod."""
+        return self.friction if self.seal_speed is None else 0.0
 
     @property
     def damping(self) -> float:
         """Mean of both bleeds [N s/m], the C of the base row of the damper."""
-        return 0.5 * (self.bleed[REBOUND] + self.bleed[COMPRESSION])
+        return mean_bleed(*self.bleed)
 
     @property
     def row(self) -> Array:
         """(1, r) parameter row of the path."""
-        return constant_rows(self.friction, self.damping, self.stiffness, {"knee": self.effect()})[0]
+        return constant_rows(self.friction_of_flow, self.damping, self.stiffness, {"knee": self.effect()})[0]
+
+    def seal_force(self, motion: Motion) -> Array | None:
+        """Compute the (n,) friction on the rod along a motion [N]; None where it is of the flow."""
+        if self.seal_speed is None:
+            return None
+        effects = {"seal": {"F_s": self.friction, "v_s": self.seal_speed}}
+        _, parallel = constant_rows(0.0, self.damping, self.stiffness, effects)
+        return None if parallel is None else parallel_force_along(motion, parallel)
 
     def effect(self) -> dict[str, float]:
         """Return the parameters of the law `knee` beside T0, `damping` and k."""
-        forces = [min(self.knee_force(direction), NO_KNEE) for direction in (REBOUND, COMPRESSION)]
-        return {
-            "beta": (self.bleed[REBOUND] - self.bleed[COMPRESSION]) / (2.0 * self.damping),
-            "F_reb": forces[REBOUND],
-            "C_reb": self.blow_off[REBOUND],
-            "F_comp": forces[COMPRESSION],
-            "C_comp": self.blow_off[COMPRESSION],
-            "q_reb": self.square[REBOUND],
-            "q_comp": self.square[COMPRESSION],
-        }
+        forces = self.knee_force(REBOUND), self.knee_force(COMPRESSION)
+        return parameters_of(self.bleed, self.square, forces, self.blow_off, self.spread)
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,10 @@ class KneeForm:
     """Whether rebound and compression have a knee."""
     has_square: tuple[bool, bool] = (False, False)
     """Whether their bleeds have a square part."""
+    has_round_knee: tuple[bool, bool] = (False, False)
+    """Whether their knees are round."""
+    has_seal: bool = False
+    """Whether the friction is on the rod."""
     has_gas: tuple[bool, bool] = (True, True)
     """Whether there is a gas force F_0, and a gas spring k_g."""
 
@@ -103,23 +118,36 @@ class KneeForm:
     @property
     def directions_with_knee(self) -> tuple[int, ...]:
         """Directions with a knee."""
-        return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_knee[direction])
+        return _directions(self.has_knee)
 
     @property
     def directions_with_square(self) -> tuple[int, ...]:
         """Directions whose bleed has a square part."""
-        return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_square[direction])
+        return _directions(self.has_square)
+
+    @property
+    def directions_with_round_knee(self) -> tuple[int, ...]:
+        """Directions whose knee is round."""
+        return _directions(self.has_round_knee)
+
+    def without_round_knee(self, direction: int) -> KneeForm:
+        """Return the selection with a sharp knee in one direction."""
+        return replace(self, has_round_knee=_without(self.has_round_knee, direction))
 
     def without_knee(self, direction: int) -> KneeForm:
         """Return the selection without the knee of one direction."""
-        return replace(self, has_knee=_without(self.has_knee, direction))
+        knee, round_knee = (_without(each, direction) for each in (self.has_knee, self.has_round_knee))
+        return replace(self, has_knee=knee, has_round_knee=round_knee)
 
     def without_square(self, direction: int) -> KneeForm:
         """Return the selection without the square part of the bleed of one direction."""
         return replace(self, has_square=_without(self.has_square, direction))
 
     def natural(self, curve: KneeCurve) -> Array:
-        """Return the free parameters (p,) in SI units: T0, the bleeds, k, w_k and B of each knee, q of each square."""
+        """Return the free parameters (p,) in SI units.
+
+        T0, bleeds, k, w_k and B of each knee, q of each square part, s of each round knee, v_s of a seal.
+        """
         bleeds = curve.bleed[:1] if self.symmetric else curve.bleed
         knees = [
             value
@@ -127,20 +155,25 @@ class KneeForm:
             for value in (curve.knee_speed[direction], curve.blow_off[direction])
         ]
         squares = [curve.square[direction] for direction in self.directions_with_square]
-        return np.array([curve.friction, *bleeds, curve.stiffness, *knees, *squares])
+        spreads = [curve.spread[direction] for direction in self.directions_with_round_knee]
+        seal = [curve.seal_speed] if self.has_seal and curve.seal_speed is not None else []
+        return np.array([curve.friction, *bleeds, curve.stiffness, *knees, *squares, *spreads, *seal])
 
     def curve(self, natural: Array) -> KneeCurve:
         """Return the curve of the free parameters (p,)."""
-        friction, *rest = natural.tolist()
-        bleed = (rest[0], rest[0]) if self.symmetric else (rest[0], rest[1])
-        stiffness, *knees = rest[1:] if self.symmetric else rest[2:]
-        speed, slope = [np.inf, np.inf], [*bleed]
-        for place, direction in enumerate(self.directions_with_knee):
-            speed[direction], slope[direction] = knees[2 * place : 2 * place + 2]
-        square = [0.0, 0.0]
-        for direction, q in zip(self.directions_with_square, knees[2 * len(self.directions_with_knee) :], strict=True):
-            square[direction] = q
-        return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]), (square[0], square[1]))
+        values = iter(natural.tolist())
+        friction, rebound = next(values), next(values)
+        bleed = (rebound, rebound if self.symmetric else next(values))
+        stiffness = next(values)
+        speed, slope, square, spread = [np.inf, np.inf], [*bleed], [0.0, 0.0], [0.0, 0.0]
+        for direction in self.directions_with_knee:
+            speed[direction], slope[direction] = next(values), next(values)
+        for direction in self.directions_with_square:
+            square[direction] = next(values)
+        for direction in self.directions_with_round_knee:
+            spread[direction] = next(values)
+        seal = next(values) if self.has_seal else None
+        return KneeCurve(friction, bleed, stiffness, _pair(speed), _pair(slope), _pair(square), _pair(spread), seal)
 
     def searched(self, curve: KneeCurve, force: float) -> Array:
         """Return the search coordinates (p,): T0 as a share of a force [N], the logarithms of all others."""
@@ -155,6 +188,16 @@ class KneeForm:
 def _without(pair: tuple[bool, bool], direction: int) -> tuple[bool, bool]:
     """Return a choice of directions without one."""
     return pair[0] and direction != 0, pair[1] and direction != 1
+
+
+def _directions(pair: tuple[bool, bool]) -> tuple[int, ...]:
+    """Return the directions of a choice."""
+    return tuple(direction for direction in (REBOUND, COMPRESSION) if pair[direction])
+
+
+def _pair(values: Sequence[float]) -> tuple[float, float]:
+    """Return the values of rebound and compression."""
+    return values[REBOUND], values[COMPRESSION]
 
 
 BINGHAM_FORM = KneeForm(symmetric=True, has_knee=(False, False))
@@ -179,11 +222,13 @@ class KneeRecord:
     """(n,) mask of the samples that enter the criterion."""
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
-        """Compute the force (m,) of the element [N], starting from the measured force less that of the gas (2,)."""
-        return integrated_force(curve.row, self.motion, self.steps, self._first(gas), FORCE_TOLERANCE)[self.counted]
+        """Compute the force (m,) of element and seal [N], starting from the measured one less that of the gas (2,)."""
+        force = integrated_force(curve.row, self.motion, self.steps, self._first(gas), FORCE_TOLERANCE)[self.counted]
+        seal = curve.seal_force(self.motion)
+        return force if seal is None else force + seal[self.counted]
 
     def sensitivities(self, curve: KneeCurve, gas: Array, variables: Variables) -> Array:
-        """Compute the (m, v) derivatives of that force by variables."""
+        """Compute the (m, v) derivatives of the force of the element by variables."""
         given = curve.row, variables, self.motion, self.steps, self._first(gas), FORCE_TOLERANCE
         return integrated_sensitivities(*given)[1][self.counted]
 
@@ -202,7 +247,16 @@ class KneeData:
     @classmethod
     def of(cls, records: Sequence[Record]) -> KneeData:
         """Collect tests, their displacement counted from mid-stroke."""
-        middle = mid_stroke(r.displacement for r in records)
+        return cls._about(mid_stroke(r.displacement for r in records), records)
+
+    def of_few_cycles(self) -> KneeData:
+        """Return the tests up to their first `FEW_CYCLES` cycles, where they have more: these show every part alike."""
+        cut = [_few_cycles(test.record) for test in self.tests]
+        shorter = any(one.time.size < test.record.time.size for one, test in zip(cut, self.tests, strict=True))
+        return self._about(self.middle, cut) if shorter else self
+
+    @classmethod
+    def _about(cls, middle: float, records: Sequence[Record]) -> KneeData:
         # Without its noise, which a stiff oil spring would turn into force.
         clean = (replace(r, displacement=clean_displacement_of(r)) for r in records)
         motions = (Motion.of(r).centred_on(middle) for r in clean)
@@ -245,7 +299,7 @@ class KneeData:
         return float(self.measured.size * (VISIBLE * self.peak) ** 2)
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
-        """Compute the force (N,) of the element [N]."""
+        """Compute the force (N,) of element and seal [N]."""
         return np.concatenate([t.simulated(curve, gas) for t in self.tests])
 
     def sensitivities(self, curve_at: Callable[[Array], KneeCurve], x: Array, sizes: Array, gas: Array) -> Array:
@@ -270,7 +324,32 @@ class KneeData:
         along = np.stack([(row(x + step) - row(x - step)) / (2.0 * step.sum()) for step in steps])
         columns = np.flatnonzero(np.any(along != 0.0, axis=0))
         variables = Variables(columns, along[np.newaxis][:, :, columns], np.zeros(x.size))
-        return np.concatenate([t.sensitivities(curve_at(x), gas, variables) for t in self.tests])
+        found = np.concatenate([t.sensitivities(curve_at(x), gas, variables) for t in self.tests])
+        if curve_at(x).seal_speed is None:
+            return found
+        for place in (0, x.size - 1):  # T0 and v_s
+            one, other = (self._seal_force(curve_at(x + way * steps[place])) for way in (1.0, -1.0))
+            found[:, place] += (one - other) / (2.0 * steps[place, place])
+        return found
+
+    def _seal_force(self, curve: KneeCurve) -> Array:
+        """Compute the (N,) friction on the rod [N]."""
+        forces = (curve.seal_force(t.motion) for t in self.tests)
+        return np.concatenate([f[t.counted] for f, t in zip(forces, self.tests, strict=True) if f is not None])
+
+
+FEW_CYCLES = 3
+"""Cycles of a test in which the parts of the law are looked for.
+
+Reason: the first may begin from rest; of the others one is what the rest repeats. Not tuned."""
+
+
+def _few_cycles(record: Record) -> Record:
+    """Return a record up to the end of its first cycles; the record itself where it has no more, or does not repeat."""
+    run = cycles_of(record)
+    if run is None or run.count <= FEW_CYCLES:
+        return record
+    return sliced(record, record.time < run.start + FEW_CYCLES * run.period)
 
 
 # --- Start: linear least squares with the knees on a grid ---
@@ -369,10 +448,29 @@ TOLERANCE = 1e-8
 """
 OFFSET = 1e-2
 """Largest distance to the optimum [standard errors]: of an interval less than its second digit."""
-PROBE_EVALUATIONS = 4
-"""Evaluations after which a straight line that fits as well as a knee is near its optimum."""
+PROBE_EVALUATIONS = 6
+"""Evaluations after which a law without one of its parts, where that does nothing, is near its optimum."""
+DESCRIBES = 0.25
+"""Most of the squared error of another law that one leaves which describes the tests far better: half the error. Not
+tuned; a law with more numbers than a damper needs takes a few percent of what is left."""
 NEAREST_KNEE = 0.01
 """Least knee speed of the search, as a share of the largest speed: below it the oil spring governs the force."""
+SPREAD_START = 0.1
+"""Spread of a knee force at the start, as a share of it."""
+SPREAD_RANGE = (1e-3, 1.0)
+"""Smallest and largest spread of the search, as a share of the peak force."""
+ROUND_KNEE_RANGE = (0.5, 2.0)
+"""Smallest and largest speed of a round knee in the search, as a factor on that at the start, the same knee sharp: the
+law would bend about the friction at rest next."""
+SHOWN_OF_LEFT = 0.1
+"""Share of the squared error without it that a part of the law takes where it shows, however small that is.
+
+Reason: of white noise a number takes a share of one over the samples; and what is left out bends the numbers that stay,
+as a straight bleed in the place of a square one does the friction. Not tuned."""
+SEAL_START = 0.003
+"""Speed v_s of a seal at the start, as a share of the largest."""
+SEAL_RANGE = (1e-4, 2e-2)
+"""Smallest and largest v_s of the search, as a share of the largest speed: beyond it is a bleed."""
 SLOPE_RANGE = (1e-3, 1e3)
 """Smallest and largest slope of the search, in peak force over peak speed; of a square part over the square of that."""
 STIFFNESS_RANGE = (1e-1, 1e5)
@@ -400,31 +498,65 @@ class KneeFit:
         return tests.simulated(self.curve, self.gas) + tests.gas_columns @ self.gas
 
 
-def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
-    """Fit the knee law; a direction has a knee, and its bleed a square part, where it fits visibly worse without.
+def fit_knees(conditions: Sequence[tuple[KneeData, float]]) -> list[KneeFit]:
+    """Fit the knee law to the conditions of one damper, with the parts that each shows.
+
+    All parts at once, with the friction of the flow or on the rod of every condition, whichever leaves less; then less
+    what does not show. Few parts first would hide the rest: a straight bleed bends the knee, a sharp knee the bleed.
 
     Parameters
     ----------
-    tests : of the condition
-    stiffness : of the oil spring at the start [N/m]
+    conditions : tests, and the stiffness of the oil spring at the start [N/m]
     """
-    straight = _with_what_shows(tests, descend(tests, KneeForm(), *grid_start(tests, stiffness)))
-    bent = descend(tests, KneeForm(has_square=(True, True)), *grid_start(tests, stiffness, square=True))
-    if not _shows(tests, bent, straight):
-        return straight
-    bent = _with_what_shows(tests, bent)
-    return bent if _predicts(tests, bent, straight) else straight
+    short = [(tests.of_few_cycles(), stiffness) for tests, stiffness in conditions]
+    simple = [descend(tests, KneeForm(), *grid_start(tests, stiffness)) for tests, stiffness in short]
+    of_flow = [_with_every_part(tests, stiffness) for tests, stiffness in short]
+    on_rod = [_on_the_rod(tests, fit) for (tests, _), fit in zip(short, of_flow, strict=True)]
+    left = [sum(fit.criterion for fit in fits) for fits in (of_flow, on_rod)]
+    whole = on_rod if left[1] < (1.0 - SHOWN_OF_LEFT) * left[0] else of_flow
+    every = zip(short, simple, whole, strict=True)
+    chosen = [_that_predicts(tests, *(_with_what_shows(tests, fit) for fit in pair)) for (tests, _), *pair in every]
+    return [descend(tests, fit.form, fit.curve, fit.gas) for (tests, _), fit in zip(conditions, chosen, strict=True)]
+
+
+def _that_predicts(tests: KneeData, simple: KneeFit, whole: KneeFit) -> KneeFit:
+    """Return the law with more parts where they show, and describe the tests far better or predict those kept back."""
+    if not _shows(tests, whole, simple):
+        return simple
+    far_better = whole.criterion < DESCRIBES * simple.criterion
+    return whole if far_better or _predicts(tests, whole, simple) else simple
+
+
+def _with_every_part(tests: KneeData, stiffness: float) -> KneeFit:
+    """Fit the law with square bleeds and knees that are round, from the best with sharp ones."""
+    sharp = descend(tests, KneeForm(has_square=(True, True)), *grid_start(tests, stiffness, square=True))
+    spread = _pair([SPREAD_START * sharp.curve.knee_force(way) for way in (REBOUND, COMPRESSION)])
+    form = replace(sharp.form, has_round_knee=(True, True))
+    return descend(tests, form, sharp.curve._replace(spread=spread), sharp.gas)
+
+
+def _on_the_rod(tests: KneeData, of_flow: KneeFit) -> KneeFit:
+    """Fit the law again with its friction on the rod."""
+    form = replace(of_flow.form, has_seal=True)
+    return descend(tests, form, of_flow.curve._replace(seal_speed=SEAL_START * tests.fastest), of_flow.gas)
+
+
+_LEFT_OUT = (KneeForm.without_square, KneeForm.without_round_knee, KneeForm.without_knee)
+"""What a form may go without in one direction."""
 
 
 def _with_what_shows(tests: KneeData, best: KneeFit) -> KneeFit:
-    """Leave the square parts and knees out that do not show, one after the other, all else fitted again."""
-    for left_out, direction in product((KneeForm.without_square, KneeForm.without_knee), (REBOUND, COMPRESSION)):
+    """Leave out square parts, spreads and knees that do not show, one after the other, all else fitted again."""
+    for left_out, direction in product(_LEFT_OUT, (REBOUND, COMPRESSION)):
         form = left_out(best.form, direction)
         if form == best.form:
             continue
         without = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
+        if best.criterion < DESCRIBES * without.criterion:
+            continue
+        without = without if without.converged else descend(tests, form, without.curve, without.gas)
         if not _shows(tests, best, without):
-            best = descend(tests, form, without.curve, without.gas)
+            best = without
     return best
 
 
@@ -488,9 +620,9 @@ def _predicts(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
 
 
 def _shows(tests: KneeData, fit: KneeFit, without: KneeFit) -> bool:
-    """Tell whether a part of the law reduces the residual visibly beyond a fit without it."""
-    gained = rms(without.residuals) ** 2 - rms(fit.residuals) ** 2
-    return gained > (VISIBLE * tests.peak) ** 2
+    """Tell whether a part of the law takes a visible force off what a fit leaves without it, or much of that."""
+    left, gained = rms(without.residuals) ** 2, rms(without.residuals) ** 2 - rms(fit.residuals) ** 2
+    return gained > min((VISIBLE * tests.peak) ** 2, SHOWN_OF_LEFT * left)
 
 
 def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
@@ -523,7 +655,7 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
         by = tests.sensitivities(lambda x: form.found(x, peak), x, np.ones(x.size), gas)
         return projected(-by) / norm
 
-    low, high = _search_bounds(tests, form)
+    low, high = _search_bounds(tests, form, start)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
     found = minimise(
         residuals,
@@ -544,18 +676,24 @@ def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evalu
     return KneeFit(form, curve, of_gas, left, slopes_at_optimum, criterion(left, tests.measured), found.converged)
 
 
-def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
-    """Return the bounds (p,) of the search coordinates."""
-    unit = tests.peak / tests.fastest
+def _search_bounds(tests: KneeData, form: KneeForm, start: KneeCurve) -> tuple[Array, Array]:
+    """Return the bounds (p,) of the search coordinates, those of a round knee about its speed at the start."""
+    unit, fastest = tests.peak / tests.fastest, tests.fastest
     stroke = 2.0 * max(float(np.max(np.abs(t.motion.displacement))) for t in tests.tests)
-    slope = [np.log(share * unit) for share in SLOPE_RANGE]
-    spring = [np.log(share * tests.peak / stroke) for share in STIFFNESS_RANGE]
-    knee = [np.log(NEAREST_KNEE * tests.fastest), np.log(tests.fastest)]
-    bleeds = 1 if form.symmetric else 2
-    square = [each - np.log(tests.fastest) for each in slope]
-    pairs = [[0.0, 1.0], *[slope] * bleeds, spring, *[knee, slope] * len(form.directions_with_knee)]
-    pairs += [square] * len(form.directions_with_square)
-    return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
+    slope = [share * unit for share in SLOPE_RANGE]
+    pairs = [slope] * (1 if form.symmetric else 2)
+    pairs.append([share * tests.peak / stroke for share in STIFFNESS_RANGE])
+    for direction in form.directions_with_knee:
+        knee = [NEAREST_KNEE * fastest, fastest]
+        if form.has_round_knee[direction]:
+            knee = [min(max(start.knee_speed[direction] * factor, knee[0]), knee[1]) for factor in ROUND_KNEE_RANGE]
+        pairs += [knee, slope]
+    pairs += [[each / fastest for each in slope]] * len(form.directions_with_square)
+    pairs += [[share * tests.peak for share in SPREAD_RANGE]] * len(form.directions_with_round_knee)
+    if form.has_seal:
+        pairs.append([share * fastest for share in SEAL_RANGE])
+    low, high = np.log(np.array(pairs)).T
+    return np.concatenate([[0.0], low]), np.concatenate([[1.0], high])
 
 
 def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:

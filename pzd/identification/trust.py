@@ -264,11 +264,17 @@ def displacement_noise(displacement: Array) -> float:
     return float(np.quantile(np.abs(np.diff(displacement, 3)), 0.9) / (1.645 * np.sqrt(20.0)))
 
 
+OF_THE_MODEL = "the parameters are the model's, not the damper's"
+"""What a misfit makes of the parameters, for statuses."""
+NOT_CONVERGED = "the least squares have not converged"
+"""Why a row is not `ok` whose fit ended before its optimum."""
+
+
 def _doubt(left: float, misfit: Misfit) -> str | None:
     """Return the reason why all parameters are weak, however narrow their intervals: the model lacks something."""
     reasons = []
     if misfit.is_large:
-        reasons.append(f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+        reasons.append(f"the model misses {misfit.share:.1%} of peak: {OF_THE_MODEL}")
     if left > LARGEST_RESIDUAL:
         reasons.append(f"the model leaves {left:.0%} of the force's r.m.s.")
     return "; ".join(reasons) or None

@@ -272,7 +272,7 @@ def attempts() -> tuple[Attempt, ...]:
 
 def candidates() -> tuple[Effect, ...]:
     """Return the effects that can act at a constant voltage and temperature."""
-    return tuple(effect for effect in nameable().values() if effect.needs is None)
+    return tuple(effect for effect in nameable().values() if effect.needs is None and not effect.beside_gas)
 
 
 def excluded() -> tuple[str, ...]:

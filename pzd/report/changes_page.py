@@ -148,10 +148,13 @@ def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
 
 
 def _quantities(changes: Changes, control: Control) -> TextTable:
-    header = ("quantity", control.name, "before", "after", "95 % interval", "change", "in %", "share")
+    header = ("quantity", control.name, "before", "after", "95 % interval", "change", "size grew by", "share")
     listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
     rows = [row for each in listed_rows for row in _rows(each, control)]
-    title = "Each quantity before and after; a share is that of all its values, and those without one did not change"
+    title = (
+        "Each quantity before and after, with 95 % intervals; in % of its size; a share is that of all its values, and "
+        "those without one did not change"
+    )
     return TextTable(title, *_without_control_where_none(header, rows))
 
 
@@ -176,13 +179,22 @@ def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...
         same = TOO_SMALL if holds_what_was(each, i) is False else DASH
         share = percent(each.share) if isinstance(each, Change) else same
         change = None if start is None or to is None else to - start
-        relative = None if change is None or not start else change / abs(start)
         at = amount(each.at_voltage_V[i], control.unit) if each.at_voltage_V is not None else DASH
         interval = DASH if low is None or high is None else f"{number(low, 4)} to {number(high, 4)}"
         yield (
             name, at, amount(start, each.unit, 4), amount(to, each.unit, 4), interval, amount(change, each.unit),
-            percent(relative), share,
+            _growth_between(start, to, low, high), share,
         )  # fmt: skip
+
+
+def _growth_between(start: float | None, to: float | None, low: float | None, high: float | None) -> str:
+    """Return by how many % the size of a quantity grew, with the interval; a dash where it was 0 or its sign turned."""
+    grown = None if start is None or to is None else _growth(start, to)
+    ends = [None if start is None or end is None else _growth(start, end) for end in (low, high)]
+    if grown is None or None in ends:
+        return percent(grown)
+    least, most = sorted(end for end in ends if end is not None)
+    return f"{percent(grown)} ({percent(least)} to {percent(most)})"
 
 
 def _left_out(found: Compared) -> Iterator[Block]:
@@ -212,8 +224,8 @@ def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
 
 
 def _growth(before: float, after: float) -> float | None:
-    """Return by what share the magnitude of a force grew; None where its sign turned, or it was 0."""
-    return abs(after) / abs(before) - 1.0 if before * after > 0.0 else None
+    """Return by what share the magnitude of a quantity grew; None where its sign turned, or it was 0."""
+    return abs(after) / abs(before) - 1.0 if before and before * after >= 0.0 else None
 
 
 # --- Pictures

@@ -22,6 +22,8 @@ TOO_SMALL = "too small to matter"
 """Of an unchanged quantity whose interval leaves its first value out: the force does not show it visibly."""
 _WHOLE = 1.005
 """Sum of the shares from which on the terminal says why they are more than 100 %: below it they round to it."""
+PASSES = {True: "yes", False: "no", None: "open, for something of it is not known"}
+"""Words for whether all quantities lie within their limits."""
 
 
 def changes_lines(found: Changes, control: Control) -> Iterator[str]:
@@ -68,5 +70,5 @@ def course_lines(found: Course, control: Control) -> Iterator[str]:
     yield f"from {found.from_} to {found.to}: {found.verdict}; {found.reason}"
     table = tables.course(found, control)
     yield from (f"{table.title}:", *table.lines("  "))
-    if found.pass_ is not None:
-        yield f"all within the tolerance: {'yes' if found.pass_ else 'no'}"
+    if any(row.limits is not None for row in found.over) or found.pass_ is not None:
+        yield f"all within the tolerance: {PASSES[found.pass_]}"

@@ -44,6 +44,12 @@ class DamperModels:
         return self.diagnosed.damper != self.diagnosed.baseline
 
     @property
+    def added(self) -> tuple[str, ...]:
+        """Effects that the final damper has and the baseline has not: what belongs to a fitted law is none of them."""
+        known = {*self.diagnosed.baseline.effects, *fitted_laws()}
+        return tuple(name for name in self.diagnosed.damper.effects if name not in known)
+
+    @property
     def fitted_law(self) -> bool:
         """Whether identify adopted another law than Bingham's."""
         return any(name in fitted_laws() for name in self.diagnosed.baseline.effects)

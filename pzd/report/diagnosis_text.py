@@ -105,8 +105,6 @@ def headline(diagnosis: Diagnosis) -> str:
     useful = [f"{name} {share}" for name, each, share in supported if each.added]
     if diagnosis.verdict in _DOUBTFUL and diagnosis.confidence is not None and not _confident(diagnosis.confidence):
         return _DOUBTFUL[diagnosis.verdict]
-    if diagnosis.verdict == "unexplained" and diagnosis.by_knee_law:
-        return "the law that was fitted leaves a gap, and no effect was looked for beside it"
     if diagnosis.verdict != "unexplained" or not supported or diagnosis.left_of_peak is None:
         return _VERDICTS[diagnosis.verdict]
     predict = "predicts, whatever it stands for" if len(useful) == 1 else "predict, whatever they stand for"
@@ -137,9 +135,9 @@ def _open_names(diagnosis: Diagnosis) -> str:
     """Return the answers that the confidence of an ambiguous verdict is about: all that was adopted, or a rival."""
     if diagnosis.verdict != "ambiguous" or not diagnosis.rivals:
         return ""
-    together = " and ".join(diagnosis.effects) or "nothing"
-    comma = "," if len(diagnosis.effects) > 1 else ""
-    return f" that it is {together}{comma} or {' or '.join(diagnosis.rivals)}"
+    if not diagnosis.effects:
+        return f" that it is nothing or {' or '.join(diagnosis.rivals)}"
+    return f" that it is {' or '.join([*diagnosis.effects, *diagnosis.rivals])}, alone or together"
 
 
 def _gap(diagnosis: Diagnosis) -> str:
@@ -159,7 +157,7 @@ def _gap(diagnosis: Diagnosis) -> str:
 
 def no_gap(diagnosis: Diagnosis) -> str:
     """Return why there is no gap, as words behind it."""
-    return "not looked for under the knee law" if diagnosis.by_knee_law else "could not be measured"
+    return "not computed, for the knee law misses nothing visible" if diagnosis.by_knee_law else "could not be measured"
 
 
 def noise_named(gap: Gap) -> str:
@@ -183,6 +181,10 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
     listed = sorted(found.left_out_voltages, key=lambda left: -left.W_s)
     for left in listed if every_test else listed[:1]:
         yield f"left out: {shown(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
+    levels = sorted({test.voltage for test in found.by if test.voltage is not None})
+    if len(levels) == 2:
+        low, high = (shown(level) for level in levels)
+        yield f"between {low} and {high} {unit}: taken on a line, for no third level was tested that would show it"
 
 
 def counted_from(diagnosis: Diagnosis, effect: str, name: str, place: str) -> str:

@@ -96,8 +96,6 @@ def _missing(context: ReportContext) -> str:
         return _capital(listed([spelled(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
         return "Nothing that these tests can see"
-    if context.damper.fitted_law:
-        return "Nothing was looked for"
     return f"Something unexplained, beside {names}" if names else "Something unexplained"
 
 
@@ -123,7 +121,7 @@ def _confidence(context: ReportContext) -> Card:
 def _unsure(diagnosis: Diagnosis) -> str:
     """Return why no confidence is stated."""
     if diagnosis.by_knee_law:
-        return "The knee law is handed on as it was fitted, and no effect was tried beside it."
+        return "The knee law misses nothing visible, so that no effect was tried beside it."
     if not diagnosis.ranking:
         return "No effect was tried on these tests."
     return "A probability is that of a name, and what is left has none."

@@ -211,6 +211,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
             _estimated("bleed_Ns_per_m", "bleed", "N s/m"),
             _estimated("bleed_square_Ns2_per_m2", "square part of it", "N s2/m2", optional=True),
             _estimated("knee_force_N", "knee", "N"),
+            _estimated("knee_spread_N", "spread of it", "N", optional=True),
             _estimated("knee_velocity_m_per_s", "knee", "m/s"),
             _estimated("blow_off_Ns_per_m", "blow-off", "N s/m"),
         ),

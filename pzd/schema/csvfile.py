@@ -133,15 +133,18 @@ def _takes_text(annotation: Any) -> bool:
 
 
 def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]:
-    """Read what `write_rows` wrote (or a person edited).
+    """Read what `write_rows` wrote (or a person edited), now or in a version whose model had fewer fields.
 
     Raises
     ------
     DataError : when the header or a cell does not fit the model, with every place
     """
     lines = _records(path)
-    _check_header(path, lines[0][1] if lines else [], [control.renamed(name) for name in model.model_fields])
-    return tuple(row for _, row in _validated_rows(path, lines[1:], model, list(model.model_fields), control))
+    header, fields = lines[0][1] if lines else [], model.model_fields
+    names = [name for name in fields if fields[name].is_required() or control.renamed(name) in header]
+    if header != [control.renamed(name) for name in names]:
+        _check_header(path, header, [control.renamed(name) for name in fields])
+    return tuple(row for _, row in _validated_rows(path, lines[1:], model, names, control))
 
 
 def read_table(

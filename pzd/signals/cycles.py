@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.record import Array, Record
+from pzd.record import MAD_TO_SIGMA, Array, Record
 from pzd.signals.harmonics import MAINS
 from pzd.signals.measures import found_once, resolution, usual_step
 from pzd.signals.period import PeriodicSection, periodic_section
@@ -195,7 +195,8 @@ def _begins_with_transient(folded: Array) -> bool:
     first = np.abs(folded[0] - drift_over_cycles(folded)[0] - later.mean(axis=0))
     scatter = np.abs(later - later.mean(axis=0)).max(axis=0)
     beside = np.max([np.roll(scatter, shift) for shift in range(-2, 3)], axis=0)
-    least = max(NOISE_DEVIATIONS * float(np.median(first)) / MEDIAN_OF_NORMAL, SAME_FORCE * float(np.ptp(later)))
+    noise = MAD_TO_SIGMA * float(np.median(first))
+    least = max(NOISE_DEVIATIONS * noise, SAME_FORCE * float(np.ptp(later)))
     return bool(np.any(first[:head] > np.maximum(LIKE_OTHERS * beside[:head], least)))
 
 
@@ -328,8 +329,6 @@ TRANSIENT_PART = 10
 """Part of a cycle at its beginning in which a transient is looked for: the running median hides less than 1/20."""
 NOISE_DEVIATIONS = 5.0
 """Standard deviations of the noise that a transient exceeds: one of a hundred samples does so once in 10^4 records."""
-MEDIAN_OF_NORMAL = 0.6745
-"""Median of the magnitude of normal noise, as a share of its standard deviation."""
 
 
 def decimated_means(time: Array, values: Array, period: float, points: int) -> tuple[Array, Array]:

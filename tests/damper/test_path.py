@@ -38,6 +38,7 @@ FLOWS = [
     {"cavitation": {"d_c": 2e-3, "F_c": 80.0}},
     {"cavitation": {"d_c": (-2e-3, -1e-3), "F_c": (80.0, 200.0), "at_voltage_V": (0.0, 150.0)}},
     {"frame_compliance": {"d_f": 1e-3, "F_f": 80.0}},
+    {"mount_play": {"delta": 5e-4, "F_m": 120.0}},
     {"frame_compliance": {"d_f": (2e-3, 1e-3), "F_f": (80.0, 200.0), "at_voltage_V": (0.0, 150.0)}},
     {
         "lash": {"delta": 4e-4},
@@ -75,11 +76,21 @@ def squeezed(e: float, d: float, half: float) -> float:
     return brentq(lambda s: s + d * s / (abs(s) + half) - e, -abs(e), abs(e), xtol=1e-18, rtol=1e-14) if e else 0.0
 
 
+def jointed(e: float, play: float, free: float) -> float:
+    """What is left of a deflection behind a joint that is free at an extension of the oil spring, to a side above 0."""
+
+    def passed(s: float) -> float:
+        return 0.5 * play * (1.0 + np.clip((s - free) / (0.02 * free), -1.0, 1.0))
+
+    return brentq(lambda s: s + passed(s) - e, -abs(e) - play, abs(e) + play, xtol=1e-18, rtol=1e-14) if e else 0.0
+
+
 def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     """dF/dt written out by hand and integrated by LSODA piece by piece, w(F) found by bracketing."""
     values = {name: v for effect in damper.effects.values() for name, v in effect.items()}
     q, n, ws = values.get("q", 0.0), values.get("n", 1.0), values.get("w_s", 0.0)
-    alpha, play = values.get("alpha", 0.0), np.broadcast_to(values.get("delta", 0.0), 2)
+    alpha, play = values.get("alpha", 0.0), np.broadcast_to(damper.effects.get("lash", {}).get("delta", 0.0), 2)
+    joint = damper.effects.get("mount_play", {"delta": 0.0, "F_m": 1.0})
     F_r, C_r = values.get("F_r", np.inf), values.get("C_r", 1.0)
     pocket, mount = (
         [np.broadcast_to(values.get(name, neutral), 2) for name, neutral in pair]
@@ -98,7 +109,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
         e = np.sign(e) * max(abs(e) - at(play, u) / 2, 0.0)
         d, k = at(pocket[0], u), parameters(u)[2]
         e = squeezed(e, abs(d) * (d * e > 0.0), at(pocket[1], u) / k)
-        return squeezed(e, at(mount[0], u), at(mount[1], u) / k)
+        return jointed(squeezed(e, at(mount[0], u), at(mount[1], u) / k), joint["delta"], joint["F_m"] / k)
 
     def speed(F: float, T0: float, C: float) -> float:
         side = 1 + alpha * np.sign(F)

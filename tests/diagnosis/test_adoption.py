@@ -510,6 +510,7 @@ def test_lengths_and_masses_are_one_value_at_every_voltage(rng: np.random.Genera
         "accumulator",
         "end_stop",
         "fluid_inertia",
+        "mount_play",
     }
 
 

@@ -21,6 +21,7 @@ from pzd.diagnosis.next_test import (
     OperatingEnvelope,
     intermediate_voltage_test,
     operating_envelope,
+    repeated_longest_test,
     rounded_down,
     separating_test,
 )
@@ -283,3 +284,29 @@ def test_stroke_and_speed_stay_within_the_limits_of_the_stand(rng: np.random.Gen
     assert found.amplitude_m == pytest.approx(0.01)
     assert found.peak_speed_m_per_s is not None
     assert found.peak_speed_m_per_s <= 0.05
+
+
+def test_one_more_test_is_another_than_was_run(rng: np.random.Generator) -> None:
+    damper, tests = damper_of(THREE), ((0.5, 0.02), (1.0, 0.01))
+    records = sines(damper, rng, THREE, tests=tests, cycles=4)
+    envelope = operating_envelope(LIMITS, prepare(records), THREE)
+    asked = []
+    while (plan := repeated_longest_test(prepare(records), envelope)) is not None:
+        asked.append((plan.frequency_Hz, plan.amplitude_m, plan.voltage_V))
+        assert isinstance(plan.voltage_V, float)
+        assert plan.frequency_Hz is not None
+        assert plan.amplitude_m is not None
+        run = sines(damper, rng, (plan.voltage_V,), tests=((plan.frequency_Hz, plan.amplitude_m),), cycles=12)
+        records = (*records, *run)
+    assert len({*asked}) == len(asked) == len(THREE) * len(tests)
+
+
+def test_a_lag_beside_a_hysteresis_asks_for_a_control_signal_that_steps(rng: np.random.Generator) -> None:
+    records = prepare(sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4))
+    envelope, names = operating_envelope(LIMITS, records, THREE), ("valve_lag", "piezo_hysteresis")
+    plan = repeated_longest_test(records, envelope, names)
+    assert plan is not None
+    assert (plan.waveform, plan.voltage_V, plan.separates) == ("sine, voltage stepped", (THREE[0], THREE[-1]), names)
+    alone = repeated_longest_test(records, replace(envelope, voltages=()), names)
+    assert alone is not None
+    assert alone.waveform == "sine, ten cycles"

@@ -274,7 +274,8 @@ def test_a_play_is_found_in_the_unit_of_the_control_and_an_orifice_in_its_own(
         for name, value in names.items()
     ]
     monkeypatch.setattr("pzd.diagnosis.workflow.standard_errors", lambda _: (0.1, 10.0))
-    selection = cast("Selection", SimpleNamespace(fitted=SimpleNamespace(damper=damper, unknowns=unknowns)))
+    fitted = SimpleNamespace(damper=damper, unknowns=unknowns)
+    selection = cast("Selection", SimpleNamespace(fitted=fitted, adopted=tuple(damper.effects)))
     found = parameters_of(selection, control)
     assert (found["piezo_hysteresis"]["r"].value, found["piezo_hysteresis"]["r"].unit) == (5.0, unit)
     assert found["orifice_quadratic"]["q"].unit == "N s2/m2"

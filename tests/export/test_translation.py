@@ -8,7 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -126,6 +126,28 @@ def test_an_argument_that_c_does_without_is_left_out_with_all_that_asks_it() -> 
     assert not any("sensitivities" in text.lower() for text in (*written.functions, *written.types()))
 
 
+class _Parts(NamedTuple):
+    whole: float
+    rest: float
+
+
+def _parts(w: float) -> _Parts:
+    """Return the whole part of a number and the rest."""
+    return _Parts(math.floor(w), w - math.floor(w))
+
+
+def _one_part(w: float) -> float:
+    """Return a field of what another function gives."""
+    return _parts(w).rest + 10.0 * _parts(-w).whole
+
+
+@needs_gcc
+def test_a_field_of_what_a_function_gives_is_read(tmp_path: Path) -> None:
+    written = Translation(ROW, kernels, frozenset())
+    name = written.add(_one_part)
+    assert answers([f"{name}(R(2.25))"], written, tmp_path) == _one_part(2.25) == -29.75
+
+
 def _listed(w: float) -> float:
     """Return the sum of a list."""
     return sum([w, w])
@@ -143,7 +165,12 @@ def _named(w: float) -> float:
     return w if "a" == "b" else -w  # noqa: PLR0133  # what is translated, not what is run
 
 
-@pytest.mark.parametrize("law", [_listed, _looped, _named], ids=lambda law: law.__name__)
+def _no_part(w: float) -> float:
+    """Return a field that there is not."""
+    return math.floor(w).rest  # type: ignore[attr-defined,no-any-return]  # what is translated, not what is run
+
+
+@pytest.mark.parametrize("law", [_listed, _looped, _named, _no_part], ids=lambda law: law.__name__)
 def test_a_law_that_c_cannot_hold_is_refused_with_its_place(law: Any) -> None:
     with pytest.raises(UntranslatableError, match=r"test_translation\.py:\d+: .* is not written in C"):
         Translation(ROW, kernels, frozenset()).add(law)

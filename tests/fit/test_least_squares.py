@@ -116,3 +116,21 @@ def test_what_a_model_computes_at_random_is_no_distance_from_the_optimum(rng: np
 
     assert not minimise(residuals, np.ones(2), lambda _: columns).converged
     assert minimise(residuals, np.ones(2), lambda _: columns, resolution=jitter).converged
+
+
+def test_a_sample_without_a_slope_has_no_say_and_stops_no_search() -> None:
+    """sqrt|x - 1| at its corner has none: the other samples lead to the optimum all the same."""
+    wanted = np.array([2.0, 5.0])
+
+    def residuals(x: Array) -> Array:
+        return np.concatenate([x - wanted, [0.0 * np.sqrt(abs(x[0] - 1.0))]])
+
+    def slopes(x: Array) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            vertical = 0.0 * 0.5 / np.sqrt(np.abs(x[:1] - 1.0))
+        return np.vstack([np.eye(2), [vertical[0], 0.0]])
+
+    assert not np.all(np.isfinite(slopes(np.ones(2))))
+    found = minimise(residuals, np.ones(2), slopes)
+    assert found.converged
+    np.testing.assert_allclose(found.x, wanted, rtol=1e-9)

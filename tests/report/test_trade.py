@@ -16,6 +16,7 @@ from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.report import tables
 from pzd.report.columns import TERMINAL
+from pzd.report.damper_models import DamperModels
 from pzd.report.diagnosis_text import diagnosis_lines
 
 PLACE = {"setting": "gap 0.25 mm", "voltage_V": 0.0, "temperature_degC": 22.0}
@@ -97,7 +98,7 @@ def with_knee(run: Any) -> Any:
     damper = Damper(base=run.diagnosed.baseline.base).with_effect(
         "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
     )
-    diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
+    diagnosis = run.diagnosed.diagnosis.without_effects("none", "the knee law is handed on", gap=None)
     shown = replace(run.identified.characteristics, as_it_stands=(knock(),))
     return replace(
         run,
@@ -120,11 +121,11 @@ def page(run, words_only: None, tmp_path_factory: pytest.TempPathFactory) -> str
     return with_knee(run).told(folder=folder).page
 
 
-def test_under_the_knee_law_no_gap_was_looked_for_in_the_terminal_and_on_the_page(page: str, run: Any) -> None:
+def test_a_knee_law_that_misses_nothing_visible_has_no_gap_in_the_terminal_nor_on_the_page(page: str, run: Any) -> None:
     lines = diagnosis_lines(with_knee(run).diagnosed.diagnosis, Control())
-    assert "gap: not looked for under the knee law" in lines
-    assert "The gap was not looked for under the knee law." in page
-    assert "The knee law is handed on as it was fitted, and no effect was tried beside it." in page
+    assert "gap: not computed, for the knee law misses nothing visible" in lines
+    assert "The gap was not computed, for the knee law misses nothing visible." in page
+    assert "The knee law misses nothing visible, so that no effect was tried beside it." in page
     assert "could not be measured" not in page
 
 
@@ -172,9 +173,16 @@ def test_the_terminal_has_the_extremes_of_such_a_record_and_the_force_a_psi() ->
 
 def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
     assert "What is missing from the knee law?" in page
-    assert "Nothing was looked for" in page
+    assert "Nothing that these tests can see" in page
     assert "simple model fails" not in page
     assert "library of effects does not explain" not in page
+
+
+def test_what_belongs_to_the_law_is_not_among_what_was_added(run: Any) -> None:
+    diagnosed = with_knee(run).diagnosed
+    with_play = replace(diagnosed, damper=diagnosed.baseline.with_effect("lash", {"delta": 5e-4}))
+    models = DamperModels(with_play, ())
+    assert (models.added, models.fitted_law, models.extended) == (("lash",), True, True)
 
 
 def test_without_a_knee_law_the_page_says_nothing_of_it(run, words_only: None, tmp_path: Path) -> None:

@@ -183,6 +183,14 @@ def test_a_temperature_that_flickers_between_two_steps_drops_out_nowhere(rng: np
         assert sizes([replace(record, temperature=lost)], dropouts)
 
 
+def test_noise_of_a_coarse_thermometer_is_no_drop_out(rng: np.random.Generator) -> None:
+    """A few samples stand two steps away from their neighbours, with the step between them about."""
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        temperature = np.round(25.0 + 0.05 * one.standard_normal(record.time.size), 1)
+        assert not sizes([replace(record, temperature=temperature)], dropouts)
+
+
 @pytest.mark.parametrize("gain", [0.6, 0.92, 1.08])
 def test_a_gain_that_steps_is_told_with_its_size_and_its_instant(gain: float, rng: np.random.Generator) -> None:
     told = 0

@@ -186,7 +186,7 @@ def test_displacement_and_force_exchanged_are_told_as_such(tmp_path: Path, rng: 
     assert len(run(tmp_path, {"path": "a.csv"} | exchanged | units).records) == 1
 
 
-@pytest.mark.parametrize(("asked", "left"), [("sss", 3), ("ss.", 2), ("s...", 0), ("r...", 1)])
+@pytest.mark.parametrize(("asked", "left"), [("sss", 3), ("ss.", 2), ("s.", 0), ("s...", 0), ("r...", 1)])
 def test_a_delay_that_most_tests_of_its_kind_do_not_ask_for_is_a_law_that_is_missing(asked: str, left: int) -> None:
     """A mount that slips asked for a quarter of a second in two sines of fifteen; a road shows what no sine does."""
 

@@ -90,6 +90,12 @@ def test_a_spreadsheet_may_save_rows_its_own_way(tmp_path: Path) -> None:
     assert read_rows(path, Row, VOLTAGE) == (Row(name="a", voltage_V=1.0, force_N=2.5),)
 
 
+def test_a_file_of_a_version_with_fewer_columns_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("name,voltage_V,force_N,published\na,1,2.5,x\n", encoding="utf-8")
+    assert read_rows(path, Row, VOLTAGE) == (Row(name="a", voltage_V=1.0, force_N=2.5, published="x"),)
+
+
 TOP = "name,voltage_V,force_N,inside,published\n"
 
 

@@ -146,11 +146,13 @@ def _flow() -> Iterator[str]:
     yield from _yield(_has(effects, "yield_force"))
     yield from _viscous(_has(effects, "viscous_force"))
     yield from _extra(_has(effects, "extra_force"))
-    lines = ["edge, slope = math.inf, 1.0"]
+    lines = ["edge, slope, spread = math.inf, 1.0, 0.0"]
     for effect in _has(effects, "opens_at"):
         opens, beyond = (_call(effect, name, T0="T0", side="side") for name in ("opens_at", "slope_beyond"))
-        lines += _guarded(effect, f"at = {opens}", "if at < edge:", f"    edge, slope = at, {beyond}")
-    yield from _function("relief_of(T0, side, p)", *lines, "return edge, slope")
+        about = _call(effect, "spread", side="side") if effect in _has(effects, "spread") else "0.0"
+        taken = f"    edge, slope, spread = at, {beyond}, {about}"
+        lines += _guarded(effect, f"at = {opens}", "if at < edge:", taken)
+    yield from _function("relief_of(T0, side, p)", *lines, "return edge, slope, spread")
 
 
 def _yield(effects: Sequence[Effect]) -> Iterator[str]:
@@ -342,8 +344,9 @@ extra_speed: Callable[[float, float, float, Row], float] = _MODULE.extra_speed
 """Flow speed [m/s] at which C w and the extra force together take a force [N]; -1 where there is no closed form."""
 extra_none: Callable[[Row], bool] = _MODULE.extra_none
 """Whether there is no extra force."""
-relief_of: Callable[[float, float, Row], tuple[float, float]] = _MODULE.relief_of
-"""Force from which a valve is open [N] and the slope beyond [N s/m], by T0 [N] and side; the first to open counts."""
+relief_of: Callable[[float, float, Row], tuple[float, float, float]] = _MODULE.relief_of
+"""Force at which a valve opens [N], slope beyond [N s/m] and spread of that force [N], by T0 [N] and side; the first to
+open counts."""
 
 parallel_force: Callable[[float, float, float, Array], float] = _MODULE.parallel_force
 """Parallel force without memory [N] at one x [m], v [m/s], a [m/s2] and one row of the parallel effects."""

@@ -30,7 +30,7 @@ def library() -> dict[str, Effect]:
     _check_own()
     places = get_args(Place)
     found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (places.index(e.place), e.name))
-    unhidden = [effect.name for effect in found if effect.hidden is None and effect.never_named is None]
+    unhidden = [e.name for e in found if e.hidden is None and e.never_named is None and not e.beside_gas]
     if unhidden:
         raise ImportError(f"{__path__[0]}/{unhidden[0]}.py: says not how the benchmark hides it (`hidden`)")
     return {effect.name: effect for effect in found}
@@ -55,7 +55,7 @@ def _check_own() -> None:
 
 @cache
 def nameable() -> dict[str, Effect]:
-    """Return the effects that a verdict may name and the benchmark hides."""
+    """Return the effects that a verdict may name; the benchmark hides them, but for those that need a gas."""
     return {name: effect for name, effect in library().items() if effect.never_named is None}
 
 

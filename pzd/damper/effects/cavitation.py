@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pzd.damper.effect import Beside, Effect, Parameter, Scales, Search, Strength
 
@@ -96,7 +97,7 @@ Reason: pocket or mount then begins seven times as soft as the oil, and has give
 bears a seventh of its force: whoever takes the joint apart finds a play lined with rubber. Not tuned."""
 
 
-def soft_play(length: float | tuple[float, ...], half: float | tuple[float, ...], beside: Beside) -> str | None:
+def soft_play(length: ArrayLike, half: ArrayLike, beside: Beside) -> str | None:
     """Return the name of the play that a pocket or a mount of a length d [m] is, with F_d [N]; None if it is none.
 
     Either may be one for each voltage: it is a play if it is one at all of them.

@@ -18,12 +18,12 @@ from pzd.damper.compose import respond
 from pzd.damper.confounders import known
 from pzd.damper.effect import NODE_VOLTAGES, EffectValues, Parameter, Scales
 from pzd.damper.effects import library
-from pzd.damper.fitted_laws import fitted_laws, knee
-from pzd.damper.model import BaseRow, Damper, against_nature
+from pzd.damper.fitted_laws import fitted_laws, knee, seal
+from pzd.damper.model import BaseRow, Damper, acts_at_a_place, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
-from pzd.diagnosis.changes.state import about, acts_at_a_place
 from pzd.diagnosis.fit.problem import BOUND
+from pzd.diagnosis.search.determination import force_at_rest
 from pzd.quantities import BINGHAM
 from pzd.record import Array, Complex
 
@@ -161,7 +161,9 @@ class FirstState:
         for c, x in zip(coordinates, values, strict=True):
             if c.of == "stand" or c.parameter == SHARE:
                 continue
-            if c.name in ELEMENT_COLUMNS or c.name == "temperature":
+            if c.name == "T0" and {seal.EFFECT.name, knee.EFFECT.name} <= {*effects}:
+                self._move_seal(effects[seal.EFFECT.name], c, x)
+            elif c.name in ELEMENT_COLUMNS or c.name == "temperature":
                 of_node = range(len(groups)) if c.node is None else (c.node,)
                 for original in (row for i in of_node for row in groups[i][1]):
                     rows[id(original)] = self._row(rows[id(original)], c, x, warmer)
@@ -175,7 +177,7 @@ class FirstState:
         damper = self.damper.model_copy(update={"base": base, "effects": effects})
         if not placed:
             return damper
-        damper = about(damper, self.middle_m)
+        damper = damper.about(self.middle_m)
         effects = {name: dict(own) for name, own in damper.effects.items()}
         for c, x in placed:
             self._move_effect(effects, c, x)
@@ -186,7 +188,7 @@ class FirstState:
         groups = rows_per_voltage(self.damper.base)
         more = [float(np.mean([rows[id(row)].T0_N - row.T0_N for row in group])) for _, group in groups]
         values = dict(law)
-        for name in knee.OPENS:
+        for name in knee.KNEE_FORCES:
             force, nodes = np.atleast_1d(law[name]), np.atleast_1d(law.get(NODE_VOLTAGES, 0.0))
             rubs = np.interp(nodes, [voltage for voltage, _ in groups], more)
             moved = [knee.with_seal(*each) for each in zip(force.tolist(), rubs.tolist(), strict=True)]
@@ -203,15 +205,26 @@ class FirstState:
             return row.model_copy(update={column: value * float(np.exp(x))})
         return row.model_copy(update={column: max(value + x * self._friction_unit(value, c.node), 0.0)})
 
+    def _move_seal(self, own: dict[str, float | tuple[float, ...]], c: Coordinate, x: float) -> None:
+        """Change the friction where it is that of a seal, at one control signal or at all."""
+
+        def moved(friction: float) -> float:
+            return max(friction + x * self._friction_unit(friction, c.node), 0.0)
+
+        given = own["F_s"]
+        at = (moved(f) if c.node in (None, i) else f for i, f in enumerate(np.atleast_1d(given).tolist()))
+        own["F_s"] = tuple(at) if isinstance(given, tuple) else next(at)
+
     def _friction_unit(self, friction: float, node: int | None) -> float:
         """Return by how much a T0 [N] changes by one unit of its coordinate, of one control signal or of all [N]."""
-        of_all = node is None and any(LEAST_FRICTION * self.force < row.T0_N for row in self.damper.base)
+        of_all = node is None and any(LEAST_FRICTION * self.force < each for each in frictions(self.damper))
         return friction if of_all or friction > LEAST_FRICTION * self.force else self.force
 
     def least_friction(self, node: int | None) -> float:
         """Return the coordinate of T0 at which no friction is left, at one control signal or at all."""
-        rows = self.damper.base if node is None else rows_per_voltage(self.damper.base)[node][1]
-        return min(-row.T0_N / (self._friction_unit(row.T0_N, node) or 1.0) for row in rows)
+        given = frictions(self.damper)
+        some = given if node is None else [given[i] for i in rows_of_voltage(self.damper, node)]
+        return min(-each / (self._friction_unit(each, node) or 1.0) for each in some)
 
     def _move_effect(self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float) -> None:
         parameter = known_parameter(c.name, c.parameter)
@@ -228,11 +241,33 @@ class FirstState:
         return set(against_nature(without_laws(self.changed(coordinates, values, None)))) <= set(before)
 
 
+def frictions(damper: Damper) -> list[float]:
+    """Return the friction [N] of each base row, of the flow and of a seal on the rod."""
+    return [row.T0_N + _seal_friction(damper, row.voltage_V) for row in damper.base]
+
+
+def rows_of_voltage(damper: Damper, node: int) -> list[int]:
+    """Return the indices of the base rows of one of the voltages, counted from the lowest."""
+    place = {id(row): i for i, row in enumerate(damper.base)}
+    return [place[id(row)] for row in rows_per_voltage(damper.base)[node][1]]
+
+
+def _seal_friction(damper: Damper, voltage: float | None) -> float:
+    """Return the friction of a seal on the rod [N], 0 without one; linear between the control signals of its values."""
+    own = damper.effects.get(seal.EFFECT.name, {"F_s": 0.0})
+    return float(np.interp(voltage or 0.0, np.atleast_1d(own.get(NODE_VOLTAGES, 0.0)), np.atleast_1d(own["F_s"])))
+
+
 def element_of(damper: Damper, voltage: float | None, temperature: float | None) -> Array:
-    """Return (3,) T0 [N], C [N s/m] and k [N/m] of a damper at a control signal [V] and a temperature [degC]."""
+    """Return (3,) T0 [N], C [N s/m] and k [N/m] of a damper at a control signal [V] and a temperature [degC].
+
+    T0 is all of the friction, that of a seal on the rod too.
+    """
     if temperature is None and len({row.temperature_degC for row in damper.base}) > 1:
         temperature = float(np.median([row.temperature_degC or 0.0 for row in damper.base]))
-    return np.asarray(bingham_parameters(damper, voltage, temperature)[0])
+    found: Array = np.array(bingham_parameters(damper, voltage, temperature)[0])
+    found[0] += _seal_friction(damper, voltage)
+    return found
 
 
 def without_laws(damper: Damper) -> Damper:
@@ -280,10 +315,13 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
         present = name in first.damper.effects
         if name in NOT_HERE or (not present and (name in fitted_laws() or effect.asked_last)):
             continue  # what diagnose asks for the prediction alone is no name of what is newly there
-        if effect.needs is not None:
+        if name == seal.EFFECT.name:
+            continue  # its friction is T0
+        alone = effect.beside_gas and not present and not force_at_rest(first.damper)
+        if effect.needs is not None or alone:
             continue
         found += _present(first, name) if present else [_absent(first, name)]
-        if present and name in fitted_laws():
+        if present and name == knee.EFFECT.name:
             found += _parts_of_law(found)
     return [candidate for candidate in found if all(c.low < c.high for c in candidate.coordinates)]
 
@@ -374,8 +412,8 @@ def _parts_of_law(found: Sequence[Candidate]) -> Iterator[Candidate]:
     By itself no number of them explains what all did: the tests then seem to differ in their gains.
     """
     (damping,) = next(c for c in found if c.name == "C").coordinates
-    law = max((c for c in found if c.name in fitted_laws()), key=lambda c: len(c.coordinates))
-    for names in knee.PARTS:
+    law = max((c for c in found if c.name == knee.EFFECT.name), key=lambda c: len(c.coordinates))
+    for names in knee.CHANGE_TOGETHER:
         numbers = [c for c in (damping, *law.coordinates) if c.parameter in names]
         yield replace(law, coordinates=tuple(numbers), starts=((0.0,) * len(numbers),))
 

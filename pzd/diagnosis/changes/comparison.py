@@ -11,6 +11,7 @@ import numpy as np
 from pzd.artefacts import NextTest
 from pzd.artefacts.changes import Change, Changes, Difference, Numbers, Unchanged, Verdict, holds_what_was
 from pzd.damper.compose import steady_force
+from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.effects.accumulator import POLYTROPIC
 from pzd.damper.fitted_laws import knee
 from pzd.damper.model import Damper
@@ -41,7 +42,7 @@ from pzd.diagnosis.changes.pairs import (
 )
 from pzd.diagnosis.changes.regression import Fitted, Likelihood, Regression
 from pzd.diagnosis.changes.selection import Search
-from pzd.diagnosis.changes.state import State, about
+from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.changes.uncertainty import Uncertainty
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import PreparedRecord
@@ -87,6 +88,8 @@ ONE_CONDITION = 2.0
 """Times what is visible that has to be left at one condition alone: its few tests differ by more than all together."""
 NOTHING = ""
 """In the place of a name: what rivals nothing."""
+MOST_NAMES = 3
+"""Tests of a kind that are named in a sentence."""
 SAME_RECORDING = 1e-9
 """Difference of force, as a share of the peak, of a recording from itself: the rounding of the averages."""
 EXCHANGED_LEAVES = 0.3
@@ -152,14 +155,40 @@ def findings_between(
     comparisons = comparisons_of(before, after, identify, diagnose.nuisance, known)
     mean = float(np.mean([c.mean_displacement for c in comparisons]))
     peak, middle = max(c.peak for c in comparisons), mid_stroke(r.displacement for r in before.records)
-    first = FirstState(about(before.damper, mean), peak, before.scales(), middle)
+    first = FirstState(before.damper.about(mean), peak, before.scales(), middle)
     likelihood = Likelihood(comparisons, diagnose.nuisance, known.share)
     regression = Regression(likelihood, Response(first, comparisons))
     search = Search(
         regression, candidates(first, comparisons), diagnose.adopt_bic, diagnose.rival_bic, diagnose.visible
     )
-    best = search.run()
+    best = _with_gas_force(search, search.run())
     return Findings(first, search, best, diagnose, control, before, after, identify.law)
+
+
+def _with_gas_force(search: Search, best: Fitted) -> Fitted:
+    """Put a gas force in the place of a load-cell zero beside a gas spring that changed as that of a gas does."""
+    names = {c.name for c in best.candidates}
+    if "load_cell_zero" not in names or "gas_spring" not in names:
+        return best
+    zero = next(c for c in best.candidates if c.name == "load_cell_zero")
+    preload = next(c for c in search.candidates if c.name == "preload_offset")
+    less = search.without(best, zero)
+    start = np.concatenate([less.values, [0.0]])
+    swapped = search.regression.fit((*less.candidates, preload), start, best.scatter)
+    return swapped if _is_gas(search.regression.comparisons, swapped) else best
+
+
+def _is_gas(comparisons: Sequence[Comparison], fitted: Fitted) -> bool:
+    """Whether force and stiffness beside the element changed in the proportion of a gas column.
+
+    Equation: dF_0 = - dk_g L / n, L the length of the gas column, n the exponent of the gas
+    """
+    changed = {c.parameter: x * c.scale for c, x in zip(fitted.coordinates, fitted.values, strict=True)}
+    if "F_0" not in changed or "k_g" not in changed or changed["k_g"] == 0.0:
+        return False
+    length = -POLYTROPIC * changed["F_0"] / changed["k_g"]
+    half_stroke = max(c.amplitude for c in comparisons)
+    return bool(GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke)
 
 
 # --- Tests that have no average cycle
@@ -178,6 +207,11 @@ def _error_share(damper: Damper, tests: Sequence[PreparedRecord]) -> float | Non
     measured = np.concatenate([test.record.force[mask] for test, mask in zip(tests, masks, strict=True)])
     made = np.concatenate([predicted_force(damper, test)[mask] for test, mask in zip(tests, masks, strict=True)])
     return float(np.sqrt(criterion(measured - made, measured))) if measured.any() else None
+
+
+def _first(names: Sequence[str]) -> str:
+    """Return some names in words, the first few of many."""
+    return ", ".join(names[:MOST_NAMES]) + (" and others" if len(names) > MOST_NAMES else "")
 
 
 # --- What is found
@@ -209,7 +243,7 @@ class Findings:
 
     def changes(self) -> Changes:
         """Return verdict and tables."""
-        best, rivals = self._settled()
+        best, rivals = self.best, self._rivals()
         difference = self.difference(best)
         reported = self._reported(best)
         still = self._still(best, reported)
@@ -295,9 +329,9 @@ class Findings:
         whole = difference.rms_N**2 - difference.noise_N**2
         return _beyond_noise(difference) / float(np.sqrt(whole)) if whole > 0.0 else 0.0
 
-    def _settled(self) -> tuple[Fitted, dict[str, list[Fitted]]]:
-        """Return the changes, a gas force in the place of a load-cell zero where they show gas, and their rivals."""
-        best = self._gas(self.best)
+    def _rivals(self) -> dict[str, list[Fitted]]:
+        """Return what would do as well in the place of each change; what may have changed too, by `NOTHING`."""
+        best = self.best
         rivals: dict[str, list[Fitted]] = {}
         for candidate in best.candidates:
             fits = [f for f in self.search.rivals(best, candidate) if not self._same_gas(best, candidate, f)]
@@ -305,7 +339,7 @@ class Findings:
                 rivals[candidate.name] = fits
         if self._visible_left(best) and (perhaps := self.search.perhaps(best)):
             rivals[NOTHING] = perhaps
-        return best, rivals
+        return rivals
 
     def _visible_left(self, best: Fitted) -> bool:
         """Whether a fit leaves more beyond the noise than counts as nothing.
@@ -480,36 +514,9 @@ class Findings:
             separates=("what changed", "what the model misses"),
         )
 
-    def _gas(self, best: Fitted) -> Fitted:
-        """Put a gas force in the place of a load-cell zero beside a gas spring that changed as that of a gas does."""
-        names = {c.name for c in best.candidates}
-        if "load_cell_zero" not in names or "gas_spring" not in names:
-            return best
-        zero = next(c for c in best.candidates if c.name == "load_cell_zero")
-        (preload, *_), less = (
-            [c for c in self.search.candidates if c.name == "preload_offset"],
-            self.search.without(best, zero),
-        )
-        swapped = self.search.regression.fit(
-            (*less.candidates, preload), np.concatenate([less.values, [0.0]]), best.scatter
-        )
-        return swapped if self._is_gas(swapped) else best
-
-    def _is_gas(self, fitted: Fitted) -> bool:
-        """Whether force and stiffness beside the element changed in the proportion of a gas column.
-
-        Equation: dF_0 = - dk_g L / n, L the length of the gas column, n the exponent of the gas
-        """
-        changed = {c.parameter: x * c.scale for c, x in zip(fitted.coordinates, fitted.values, strict=True)}
-        if "F_0" not in changed or "k_g" not in changed or changed["k_g"] == 0.0:
-            return False
-        length = -POLYTROPIC * changed["F_0"] / changed["k_g"]
-        half_stroke = max(c.amplitude for c in self.comparisons)
-        return bool(GAS_LENGTHS[0] * half_stroke <= length <= GAS_LENGTHS[1] * half_stroke)
-
     def _same_gas(self, best: Fitted, candidate: Candidate, rival: Fitted) -> bool:
         zero = "load_cell_zero" in _added(rival, best)
-        return candidate.name == "preload_offset" and zero and self._is_gas(best)
+        return candidate.name == "preload_offset" and zero and _is_gas(self.comparisons, best)
 
     # --- Tables
 
@@ -588,7 +595,7 @@ class Findings:
         if c.name in ELEMENT_COLUMNS:
             return self._element_values(mine)
         own = self.first.damper.effects.get(c.name, {}).get(c.parameter)
-        nodes = self.first.damper.effects[c.name]["at_voltage_V"] if isinstance(own, tuple) else None
+        nodes = self.first.damper.effects[c.name][NODE_VOLTAGES] if isinstance(own, tuple) else None
         at = cast("tuple[float, ...] | None", nodes)
         if not np.isfinite(e):
             return at, own, None, None, None
@@ -811,11 +818,13 @@ class Findings:
         told += self._misread()
         if farther := self._stroke_beyond():
             told.append(farther)
-        told.extend(
-            f"{counted(out, 'test')} of {state.name} left out: the control signal moves, or no cycle repeats"
-            for state in (self.before, self.after)
-            if (out := len(_not_averaged(state)))
-        )
+        for state in (self.before, self.after):
+            aside = _not_averaged(state)
+            moving = [test.record.name for test in aside if not test.constant]
+            unlike = [test.record.name for test in aside if test.constant]
+            for names, why in ((moving, "the control signal moves"), (unlike, "no cycle repeats")):
+                if names:
+                    told.append(f"{counted(len(names), 'test')} of {state.name} left out: {why} in {_first(names)}")
         compared = {c.after for c in self.comparisons}
         if out := sum(test.record.name not in compared for test in averaged(self.after.prepared)):
             told.append(

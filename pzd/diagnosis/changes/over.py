@@ -28,6 +28,8 @@ CYCLES_OF_BLOCK = 2
 """Fewest cycles of a block: their scatter is its noise."""
 WORST: tuple[Verdict, ...] = ("unchanged", "changed", "ambiguous", "unexplained")
 """Verdicts in the order in which one of a pair of states decides on all."""
+NOT_FOLLOWED = "{} changed in no state and is nothing that {} has, so that it is not held against its limits"
+"""Why a tolerance is left open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ def followed_over(
     changes: ChangesConfig,
     control: Control,
 ) -> Followed:
-    """Follow each quantity that changed in any state over all of them.
+    """Follow each quantity that changed in any state, or has limits, over all of them.
 
     Parameters
     ----------
@@ -61,7 +63,8 @@ def followed_over(
     slack = first.voltage_slack(identify.group.voltage_V)
     found = [findings_between(first, state, diagnose, identify, control) for state in later]
     results = [each.changes() for each in found]
-    adopted = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
+    changed = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
+    adopted = changed | _limited(found, changes.tolerance)
     rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes, slack)]
     judged = [_judged(row, changes.tolerance) for row in rows]
     passes = [row.pass_ for row in judged if _limits(row, changes.tolerance) is not None]
@@ -81,7 +84,7 @@ def followed_over(
         reason="; ".join(
             [f"{r.to}: {r.verdict}" for r in results]
             + [line for row in judged for line in _leaves(row, states)]
-            + [f"{name} changed in no state, so that it is not held against its limits" for name in open_]
+            + [NOT_FOLLOWED.format(name, first.name) for name in open_]
         ),
         pass_=_together([*passes, *(None for _ in open_)]),
     )
@@ -89,6 +92,16 @@ def followed_over(
 
 
 # --- The quantities
+
+
+def _limited(found: Sequence[Findings], tolerance: Mapping[str, tuple[float, float]]) -> set[tuple[str, str]]:
+    """Return the quantities with limits that the first damper has: one that stays as it is has to lie within them too.
+
+    Those of an effect that it has not are followed once they changed: next to none, they are told from no other.
+    """
+    present = {key for each in found for c in each.search.candidates if c.of == "damper" for key in c.key}
+    own = {*ELEMENT_COLUMNS, *found[0].first.damper.effects}
+    return {key for key in present if key[0] in own and _named(*key) in tolerance}
 
 
 def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], control: Control) -> list[CourseRow]:
@@ -215,7 +228,11 @@ def _leaves(row: CourseRow, states: Sequence[State]) -> Iterator[str]:
 
 def _quantity(row: CourseRow) -> str:
     """Return the name of a quantity as `changes.tolerance` has it."""
-    return row.name if row.name == row.parameter else f"{row.name}.{row.parameter}"
+    return _named(row.name, row.parameter)
+
+
+def _named(name: str, parameter: str) -> str:
+    return name if name == parameter else f"{name}.{parameter}"
 
 
 def _together(passes: Sequence[bool | None]) -> bool | None:

@@ -14,11 +14,12 @@ import numpy as np
 
 from pzd.damper.confounders import known
 from pzd.damper.fitted_laws import fitted_laws
+from pzd.damper.model import Damper
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes, without_laws
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
 from pzd.diagnosis.search.acceptance import misplaced_end_stop
-from pzd.diagnosis.search.determination import nearly_others
+from pzd.diagnosis.search.determination import contradiction, nearly_others
 from pzd.fit.cross_validation import SMALLEST_SINGULAR, folds_in_turn, held_out_residuals
 from pzd.fit.intervals import LEVEL
 from pzd.record import Array
@@ -420,13 +421,23 @@ class Search:
             return False
         if not first.is_natural(fitted.coordinates, fitted.values.tolist()) or self.size_of(fitted, new) < least:
             return False
-        if new.absent and new.name == "end_stop" and self._misplaced(fitted):
+        if new.absent and (self._contradicted(fitted, new) or (new.name == "end_stop" and self._misplaced(fitted))):
             return False
         return at_limit or self._each_number_shows(fitted)
 
+    def _contradicted(self, fitted: Fitted, new: Candidate) -> bool:
+        """Whether the values of an effect that is newly there are those of no such effect."""
+        if new.name not in known():
+            return False
+        return contradiction(self._changed(fitted), new.name, max(self._peaks)) is not None
+
+    def _changed(self, fitted: Fitted) -> Damper:
+        """Return the damper of the second state."""
+        return self.regression.response.first.changed(fitted.coordinates, fitted.values.tolist(), None)
+
     def _misplaced(self, fitted: Fitted) -> bool:
         """Whether an end stop that is newly there begins where none does."""
-        damper = self.regression.response.first.changed(fitted.coordinates, fitted.values.tolist(), None)
+        damper = self._changed(fitted)
         motions = [(c.motion.displacement, c.motion.velocity) for c in self.regression.comparisons]
         stroke = max(float(np.ptp(x)) for x, _ in motions) / 2.0
         return misplaced_end_stop(damper, stroke, motions) is not None
@@ -540,8 +551,7 @@ class Search:
         """Return the effect that many would call one that is newly there with such values; None for no other."""
         if not candidate.absent:
             return None
-        damper = self.regression.response.first.changed(best.coordinates, best.values.tolist(), None)
-        return nearly_others(without_laws(damper), max(self._peaks)).get(candidate.name)
+        return nearly_others(without_laws(self._changed(best)), max(self._peaks)).get(candidate.name)
 
     def _is_rival(self, fitted: Fitted, best: Fitted, less: Fitted) -> bool:
         """Whether a fit does what the best one does: nearly as likely, or it leaves no more than the model misses.

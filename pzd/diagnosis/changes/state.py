@@ -10,8 +10,8 @@ import numpy as np
 from pzd.artefacts import Identified, Rig
 from pzd.artefacts.identified import identified_damper
 from pzd.damper.effect import Scales
-from pzd.damper.effects import library
-from pzd.damper.model import Damper, Effects
+from pzd.damper.fitted_laws import fitted_laws
+from pzd.damper.model import Damper
 from pzd.diagnosis import data
 from pzd.diagnosis.campaign import flow_of
 from pzd.diagnosis.config import DiagnoseConfig
@@ -95,6 +95,9 @@ def diagnosed_state(
 ) -> State:
     """Return the state with the effects that a diagnosis in memory adopts, which the first state needs.
 
+    Beside a fitted law those with a name alone: what only predicts follows an error of the law, which is the same in
+    both states, and would take a part of what changed in the place of a number of the law.
+
     Parameters
     ----------
     state : as it was identified
@@ -112,27 +115,5 @@ def diagnosed_state(
     from pzd.diagnosis.stage import diagnose as run_stage
 
     found = run_stage(diagnose, identify, stand, rig, identified, control, setting, jobs)
-    return replace(state, damper=found.damper)
-
-
-def acts_at_a_place(name: str) -> bool:
-    """Whether an effect acts at a place of the stroke, so that no force and stiffness make up for another zero."""
-    return name in library() and any(parameter.position for parameter in library()[name].parameters)
-
-
-def about(damper: Damper, zero: float) -> Damper:
-    """Return the same damper with the force and stiffness beside the element about another displacement [m].
-
-    Equation: F_0 + k_g (x - z) = (F_0 + k_g (z' - z)) + k_g (x - z')
-    """
-    if any(acts_at_a_place(name) for name in damper.effects):
-        return damper
-    effects: Effects = {name: dict(values) for name, values in damper.effects.items()}
-    stiffness = effects.get("gas_spring", {}).get("k_g", 0.0)
-    force = effects.get("preload_offset", {}).get("F_0", 0.0)
-    if isinstance(stiffness, tuple) or isinstance(force, tuple):
-        return damper
-    moved = stiffness * (zero - damper.zero_m)
-    if moved != 0.0 or "preload_offset" in effects:
-        effects["preload_offset"] = {"F_0": force + moved}
-    return damper.model_copy(update={"effects": effects, "zero_m": zero})
+    by_law = any(name in fitted_laws() for name in found.baseline.effects)
+    return replace(state, damper=found.baseline if by_law and found.diagnosis.verdict != "named" else found.damper)

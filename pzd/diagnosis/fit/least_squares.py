@@ -12,7 +12,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from pzd.damper.model import Damper
+from pzd.damper.model import Damper, against_nature
 from pzd.diagnosis.fit.likelihood import residuals_of
 from pzd.diagnosis.fit.problem import Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
@@ -83,6 +83,11 @@ class FitResult:
         """Whether this is so near an optimum that its figures may be quoted."""
         return self.offset <= POLISHED_OFFSET
 
+    @property
+    def unphysical(self) -> tuple[str, ...]:
+        """Its effects whose values are not physical, see `against_nature`; what belongs to the law is none of them."""
+        return tuple(name for name in against_nature(self.damper) if name in self.effects)
+
     @cached_property
     def jacobian(self) -> BlockJacobian:
         """Of all residuals by the search variables."""
@@ -90,8 +95,9 @@ class FitResult:
 
     @cached_property
     def column_basis(self) -> Array:
-        """(w, 3 b + e) orthonormal basis of the columns of the Jacobian."""
-        return np.asarray(np.linalg.qr(self.jacobian.dense()).Q)
+        """(w, p) orthonormal basis of the columns of the Jacobian, p of 3 b + e: those that any test shows."""
+        columns = self.jacobian.dense()
+        return np.asarray(np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)]).Q)
 
     @cached_property
     def covariance(self) -> Array:
@@ -139,7 +145,7 @@ def fit(
     kept = left.jacobian if sum(block.size for _, block in left.jacobian.blocks) <= LARGEST_KEPT_JACOBIAN else None
     return FitResult(
         problem.point(found, unknowns).damper,
-        tuple(effects),
+        tuple(name for name in effects if name not in problem.law),
         found,
         left.residuals,
         left.simulated,
@@ -148,6 +154,11 @@ def fit(
         (lambda: kept) if kept is not None else lambda: linearise(problem, unknowns, found, limits).jacobian,
         optimum.offset,
     )
+
+
+def plain_fit(problem: Problem) -> FitResult:
+    """Fit T0, C, k and the law without any effect, from the starting values of the problem."""
+    return fit(problem, (), problem.plain_start())
 
 
 def refit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> FitResult:
@@ -166,10 +177,10 @@ def projected_out(frame: Array, values: Array) -> Array:
 
 
 def profiled_misfit(problem: Problem, damper: Damper) -> float:
-    """Return the smallest misfit over T0, C and k while the effects stay as a damper has them."""
+    """Return the smallest misfit over T0, C, k and the law while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
-    _, left, _ = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS, PRECISION)
+    _, left, _ = _search(problem, unknowns, start, problem.plain_start().size, MOST_EVALUATIONS, PRECISION)
     return float(left.stacked @ left.stacked)
 
 

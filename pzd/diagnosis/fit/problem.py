@@ -11,7 +11,8 @@ from typing import cast
 import numpy as np
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import NODE_VOLTAGES, Effect, Parameter, Scales, Search
+from pzd.damper.effect import NODE_VOLTAGES, Effect, EffectValues, Parameter, Scales, Search
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
@@ -115,9 +116,11 @@ class Unknown:
 
     def value_in(self, damper: Damper) -> float:
         """Return the value [own unit] that a damper has."""
-        if self.parameter is ZERO:
-            return damper.zero_m
-        value = damper.effects[self.effect][self.parameter.name]
+        return damper.zero_m if self.parameter is ZERO else self.value_among(damper.effects)
+
+    def value_among(self, effects: Mapping[str, EffectValues]) -> float:
+        """Return the value [own unit] among the parameters of some effects, by the effect's name."""
+        value = effects[self.effect][self.parameter.name]
         return value if isinstance(value, float) else value[self.node or 0]
 
     def derivative(self, searched: float) -> float:
@@ -141,6 +144,9 @@ class Problem:
     """Counts what is simulated."""
     rigid: bool = False
     """Whether every oil spring stays rigid."""
+    law: Mapping[str, EffectValues] = field(default_factory=dict)
+    """What else the law of the element has beside T0 + C w, as knees and a gas, with starting values by name: free in
+    every fit as T0, C and k are, and no effects."""
 
     @cached_property
     def voltages(self) -> tuple[float, ...]:
@@ -165,11 +171,12 @@ class Problem:
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
 
     def started_at(self, damper: Damper) -> Problem:
-        """Return the problem with the base rows of a damper as starting values, and its effects per voltage."""
+        """Return the problem with the rows and the law of a damper as starting values, and its effects per voltage."""
         by_voltage = frozenset(name for name, values in damper.effects.items() if NODE_VOLTAGES in values)
         reference = damper.reference_temperature_degC
         kept = self.reference_temperature if reference is None else reference
-        return replace(self, base=damper.base, per_voltage=by_voltage, reference_temperature=kept)
+        law = law_of(damper, tuple(self.law))
+        return replace(self, base=damper.base, per_voltage=by_voltage, reference_temperature=kept, law=law)
 
     def with_friction_scaling(self, effect: Effect) -> Problem:
         """Return the problem with an effect's parameters per voltage if they scale with T0."""
@@ -182,17 +189,22 @@ class Problem:
         return here / (max(row.T0_N for row in self.base) or 1.0)
 
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
-        """List the parameters of some effects in search order, the zero behind the first effect that needs it."""
+        """List the parameters of law and effects in search order, the zero behind the first effect that needs it."""
         found: list[Unknown] = []
-        for name in effects:
+        for name in (*self.law, *(name for name in effects if name not in self.law)):
             nodes = range(len(self.voltages)) if name in self.per_voltage else (None,)
-            found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
+            free = [p for p in known()[name].parameters if name not in self.law or _is_free(self.law[name], p)]
+            found += [self._unknown(name, parameter, node) for node in nodes for parameter in free]
             if known()[name].needs_displacement_zero and all(u.parameter is not ZERO for u in found):
                 found.append(self._unknown(name, ZERO, None))
         return tuple(found)
 
     def _unknown(self, effect: str, parameter: Parameter, node: int | None) -> Unknown:
         return Unknown(effect, parameter, parameter.search.scale(self.scales) or 1.0, node)
+
+    def plain_start(self) -> Array:
+        """Return the (3 b + l,) base rows and the law in the units of the search, where plain fits begin."""
+        return np.concatenate([self.start(), [u.to_search(u.value_among(self.law)) for u in self.unknowns(())]])
 
     def start(self) -> Array:
         """Return the (3 b,) base rows in the units of the search, see `pzd.fit.element_coordinates`."""
@@ -242,7 +254,10 @@ class Problem:
         self, searched: Array, unknowns: Sequence[Unknown]
     ) -> tuple[Mapping[str, Mapping[str, float | tuple[float, ...]]], float]:
         """Return the values by effect and parameter, and the zero of the displacement [m], at a point of the search."""
-        effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
+        effects: dict[str, dict[str, float | tuple[float, ...]]] = {
+            name: {p.name: values[p.name] for p in known()[name].parameters if not _is_free(values, p)}
+            for name, values in self.law.items()
+        }
         zero = 0.0
         for unknown, x in zip(unknowns, searched[3 * len(self.base) :], strict=True):
             if unknown.parameter is ZERO:
@@ -251,6 +266,18 @@ class Problem:
             given, name, value = effects.setdefault(unknown.effect, {}), unknown.parameter.name, unknown.value(float(x))
             given[name] = value if unknown.node is None else (*cast("tuple[float, ...]", given.get(name, ())), value)
         return effects, zero
+
+
+def law_of(damper: Damper, names: Sequence[str]) -> dict[str, EffectValues]:
+    """Return what of a damper belongs to the law of its element: effects of some names, and every fitted law it has."""
+    every = dict.fromkeys((*names, *fitted_laws()))
+    return {name: damper.effects[name] for name in every if name in damper.effects}
+
+
+def _is_free(values: EffectValues, parameter: Parameter) -> bool:
+    """Whether a parameter of the law is searched: it is there, and no limit, as the force of a knee that is none."""
+    value = values.get(parameter.name, parameter.neutral)
+    return not np.all(np.equal(value, parameter.neutral) | (np.asarray(value) >= parameter.high))
 
 
 def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
@@ -307,7 +334,7 @@ class Point:
         return self._nodes_by_temperature[temperature]
 
     def _node_voltages(self, effect: str) -> dict[str, tuple[float, ...]]:
-        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.per_voltage else {}
+        return {NODE_VOLTAGES: self.problem.voltages} if effect in self.problem.per_voltage else {}
 
     def effects_at(self, base_row: int) -> Mapping[str, Mapping[str, float]]:
         """Return the effects at the voltage of one base row."""

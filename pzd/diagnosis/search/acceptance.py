@@ -24,10 +24,12 @@ from pzd.diagnosis.search.determination import (
     ANOTHER_DAMPING,
     AT_LIMIT,
     at_limits,
+    contradiction,
     nearly_others,
     opens_below_friction,
 )
 from pzd.fit.intervals import LEVEL
+from pzd.identification.trust import WEAK_WIDTH
 from pzd.record import Array
 from pzd.signals.measures import rms
 
@@ -64,6 +66,8 @@ def _misplaced(candidate: Candidate, problem: Problem) -> str | None:
         return ANOTHER_DAMPING
     if candidate.effect in at_limits(candidate.fitted):
         return AT_LIMIT
+    if against := contradiction(candidate.fitted.damper, candidate.effect, problem.scales.force):
+        return against
     if candidate.effect != "end_stop":
         return None
     motions = [(o.motion.displacement, o.motion.velocity) for o in problem.observations]
@@ -184,7 +188,7 @@ def late_or_elastic(
     if least_squares.fit(rigid, (), before.optimum).misfit - before.misfit < config.rival_bic:
         return False  # the tests do not show the springs
     late = least_squares.fit(rigid, (effect.name,), start)
-    natural = not against_nature(late.damper) and late.unknowns[-1].value_in(late.damper) > 0.0
+    natural = not late.unphysical and late.unknowns[-1].value_in(late.damper) > 0.0
     if not natural or trivial(late, effect.name, rigid.scales.low_force) is not None:
         return False
 
@@ -198,6 +202,25 @@ def late_or_elastic(
     again = least_squares.fit(replace(own.whole, rigid=True), (effect.name,), late.optimum)
     leaves_less = pays(again, least_squares.refit(own.whole, before.damper)) < -config.rival_bic
     return leaves_less and pays(again, before) < config.rival_bic and not own.gap_is_significant(again, config)
+
+
+def late_beside_springs(candidate: Candidate, problem: Problem, before: FitResult, config: DiagnoseConfig) -> bool:
+    """Whether a late force pays and hardly moves the force: it takes a part of the lag that was the springs'.
+
+    Parameters
+    ----------
+    candidate : optimum with it
+    problem : observations, for the scales of their motion
+    before : optimum without it
+    config : how near a rival comes
+    """
+    fitted = candidate.fitted
+    springs = zip(before.damper.base, fitted.damper.base, strict=True)
+    stiffer = any(abs(one.k_N_per_m / other.k_N_per_m - 1.0) > WEAK_WIDTH for one, other in springs)
+    pays = candidate.delta_bic <= -config.rival_bic and candidate.explained < config.visible
+    natural = not fitted.unphysical and fitted.unknowns[-1].value_in(fitted.damper) > 0.0
+    counts = trivial(fitted, candidate.effect, problem.scales.low_force) != WITHIN_TEST_SCATTER
+    return pays and natural and stiffer and counts
 
 
 def spurious(
@@ -587,7 +610,8 @@ class Selection:
     @property
     def nearly(self) -> dict[str, str]:
         """By adopted effect, which other one it nearly is by its values."""
-        return nearly_others(self.fitted.damper, self.final_evidence.whole.scales.force)
+        others = nearly_others(self.fitted.damper, self.final_evidence.whole.scales.force)
+        return {name: other for name, other in others.items() if name in self.adopted}
 
     @property
     def _undecided_steps(self) -> list[SelectionStep]:

@@ -17,7 +17,7 @@ from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, pr
 from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
-from pzd.diagnosis.search.determination import nearly_others
+from pzd.diagnosis.search.determination import force_at_rest, nearly_others
 from pzd.record import CONSTANT_SHARE, Array
 
 # --- Starting values, and the drop in misfit that a linearised step promises from each
@@ -200,8 +200,13 @@ class Candidate:
     """Whether its optimum was searched for; else it stands for the faintest values tried."""
 
 
-def testable(problem: Problem, effect: Effect) -> bool:
-    """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
+def testable(problem: Problem, before: FitResult, effect: Effect) -> bool:
+    """Whether some test could show an effect beside those of `before`.
+
+    One of the voltage or temperature shows where it moves, one of a joint with a gas where a force is there at rest.
+    """
+    if effect.beside_gas and not force_at_rest(before.damper):
+        return False
     if effect.needs == "voltage":
         span = CONSTANT_SHARE * (problem.scales.voltage or np.inf)
         return any(o.motion.voltage is not None and np.ptp(o.motion.voltage) > span for o in problem.observations)
@@ -212,6 +217,16 @@ def testable(problem: Problem, effect: Effect) -> bool:
                 by_row.setdefault(o.base_row, []).extend(end_temperatures(o.motion.temperature))
         return any(np.ptp(temperatures) > MOVING_TEMPERATURE for temperatures in by_row.values())
     return True
+
+
+def has_name(problem: Problem, effect: Effect) -> bool:
+    """Whether a verdict may name an effect beside the law of the element.
+
+    A law of straight stages is off by as much as what bends the curve of the flow: a name for it would be one of the
+    law.
+    """
+    of_flow = any(known()[name].place == "flow" for name in problem.law)
+    return effect.name not in problem.law and (effect.curve != "flow" or not of_flow)
 
 
 def candidates(
@@ -232,11 +247,9 @@ def candidates(
     jobs : how many are fitted at the same time
     silent : noise explains what is left, so that only a faint effect can be missing
     """
-    tried = [
-        effect
-        for effect in nameable().values()
-        if effect.name not in (*before.effects, *forbidden) and testable(problem, effect)
-    ]
+    barred = (*before.effects, *forbidden)
+    tried = [e for e in nameable().values() if e.name not in barred and has_name(problem, e)]
+    tried = [effect for effect in tried if testable(problem, before, effect)]
 
     _ = before.column_basis  # every candidate needs it: computed once, before they go to threads of their own
 
@@ -420,7 +433,7 @@ def as_candidate(
         effect,
         fitted,
         delta_bic(before, fitted) if pays is None else pays,
-        force_change(problem, before, fitted),
+        force_change(problem, before.simulated, fitted.simulated),
         sum(float((after - old) @ (after - old)) for old, after in pairs),
         before.misfit - fitted.misfit,
     )
@@ -494,20 +507,17 @@ def delta_bic(before: FitResult, after: FitResult) -> float:
     return after.misfit - before.misfit + more * float(np.log(after.size))
 
 
-def force_change(problem: Problem, before: FitResult, after: FitResult) -> float:
+def force_change(problem: Problem, before: Sequence[Array], after: Sequence[Array]) -> float:
     """Compute the r.m.s. difference of two simulated forces, each record in units of its peak.
 
     Parameters
     ----------
     problem : observations, for the peak of each record
-    before, after : optima with the simulated forces, a (n,) array a record [N]
+    before, after : the simulated forces, a (m,) array a record [N], both along the motions of this problem
 
     Returns
     -------
     share of peak, over all records alike
     """
-    squares = [
-        np.mean((a - b) ** 2) / o.peak**2
-        for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)
-    ]
+    squares = [np.mean((a - b) ** 2) / o.peak**2 for o, a, b in zip(problem.observations, after, before, strict=True)]
     return float(np.sqrt(np.mean(squares)))

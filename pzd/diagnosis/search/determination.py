@@ -13,7 +13,9 @@ from itertools import combinations
 
 import numpy as np
 
-from pzd.damper.effect import Beside
+from pzd.damper.compose import static_force
+from pzd.damper.confounders import known
+from pzd.damper.effect import NODE_VOLTAGES, Beside
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
@@ -73,7 +75,7 @@ def at_limits(fitted: FitResult) -> Iterator[str]:
             near = max(thresholds.NEAR_LIMIT * float(error), thresholds.NEAREST_LIMIT)
             beside = min(float(x) - u.bounds[0], u.bounds[1] - float(x)) <= near
             ends.setdefault((u.effect, u.parameter.name), []).append(beside)
-    yield from dict.fromkeys(effect for (effect, _), each in ends.items() if all(each))
+    yield from dict.fromkeys(effect for (effect, _), each in ends.items() if all(each) and effect in fitted.effects)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,9 @@ def varying_strengths(problem: Problem, fitted: FitResult, significance: float) 
     first, found = fitted.optimum.size - len(fitted.unknowns), dict[str, Varying]()
     for column, u in enumerate(fitted.unknowns, start=first):
         effect = library().get(u.effect)
-        if effect is None or u.effect in thresholds.NUISANCE_EFFECTS or u.parameter != effect.parameters[0]:
+        if effect is None or u.parameter != effect.parameters[0]:
+            continue
+        if u.effect not in fitted.effects or u.effect in thresholds.NUISANCE_EFFECTS:
             continue
         spread, probability = between_tests(slopes, residuals, column, fitted.prior)
         size = abs(u.value_in(fitted.damper) - u.parameter.neutral) if np.isfinite(u.parameter.neutral) else np.inf
@@ -123,7 +127,7 @@ def opens_below_friction(damper: Damper) -> bool:
     if "relief_valve" not in damper.effects:
         return False
     values = damper.effects["relief_valve"]
-    nodes, opens = np.atleast_1d(values.get("at_voltage_V", 0.0)), np.atleast_1d(values["F_r"])
+    nodes, opens = np.atleast_1d(values.get(NODE_VOLTAGES, 0.0)), np.atleast_1d(values["F_r"])
     return all(float(np.interp(row.voltage_V or 0.0, nodes, opens)) <= row.T0_N for row in damper.base)
 
 
@@ -135,10 +139,31 @@ def nearly_others(damper: Damper, force: float) -> dict[str, str]:
     damper : with the effects
     force : largest force of the tests [N]
     """
-    stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
-    beside = Beside(damper.effects, tuple(row.T0_N for row in damper.base), stiffest, force)
-    others = {name: library()[name].nearly(values, beside) for name, values in damper.effects.items()}
+    beside = _beside_effects(damper, force)
+    others = {name: known()[name].nearly(values, beside) for name, values in damper.effects.items()}
     return {name: other for name, other in others.items() if other is not None}
+
+
+def contradiction(damper: Damper, effect: str, force: float) -> str | None:
+    """Say why the values of an effect of a damper are those of no such effect; None where they may be.
+
+    Parameters
+    ----------
+    damper : with the effect
+    effect : its name
+    force : largest force of the tests [N]
+    """
+    return known()[effect].contradicted(damper.effects[effect], _beside_effects(damper, force))
+
+
+def _beside_effects(damper: Damper, force: float) -> Beside:
+    stiffest = max(row.k_N_per_m or np.inf for row in damper.base)
+    return Beside(damper.effects, tuple(row.T0_N for row in damper.base), stiffest, force, force_at_rest(damper))
+
+
+def force_at_rest(damper: Damper) -> float:
+    """Compute the force of a damper at rest in the middle of its stroke [N], as of a gas."""
+    return float(static_force(damper, damper.base[0].voltage_V))
 
 
 def cancelling(problem: Problem, fitted: FitResult) -> Iterator[tuple[str, str]]:

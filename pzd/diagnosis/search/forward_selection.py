@@ -11,11 +11,13 @@ from functools import partial
 import numpy as np
 
 from pzd.damper.effects import library
-from pzd.damper.model import Damper, against_nature
+from pzd.damper.fitted_laws import fitted_laws, knee
+from pzd.damper.model import Damper
 from pzd.diagnosis import thresholds
-from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of, nearest_row
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import FitResult, fit, refit, standard_errors
+from pzd.diagnosis.fit.least_squares import FitResult, fit, plain_fit, refit, standard_errors
+from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.gap import visible_gap
 from pzd.diagnosis.search import acceptance
@@ -32,6 +34,8 @@ from pzd.diagnosis.search.candidates import (
     nearly_as_good,
     per_voltage_candidates,
 )
+from pzd.identification.knee import fitted_knee_damper
+from pzd.record import Record
 
 
 def reweighted(
@@ -101,13 +105,13 @@ def swap_step(
 
 def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
     """Whether a candidate replaces the adopted effect."""
-    if against_nature(other.fitted.damper):
+    if other.fitted.unphysical:
         return False
     if other.delta_bic <= own.delta_bic and acceptance.says_the_same(own, other):
         return True
     if acceptance.has_come_down_to(own, other):
         return True
-    return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
+    return other.delta_bic < own.delta_bic - rival_bic or bool(own.fitted.unphysical)
 
 
 # --- Forward selection
@@ -138,7 +142,7 @@ def select_effects(
     """
     weigh = partial(evidence_of, campaign)
     evidence = weigh(damper)
-    search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
+    search = _ForwardSelection(config, weigh, jobs, damper, evidence, plain_fit(evidence.whole))
     search.settle_weights()
     search.choose_oil_spring()
     if not rows_by_temperature:
@@ -193,7 +197,7 @@ class _ForwardSelection:
                 break
             self.identified = self.current.damper
             self.evidence = self.weigh(self.identified)
-            self.current = fit(self.evidence.whole, (), self.evidence.whole.start())
+            self.current = plain_fit(self.evidence.whole)
 
     def choose_oil_spring(self) -> None:
         """Take a gap for one only where neither softer nor rigid oil springs close it.
@@ -237,7 +241,7 @@ class _ForwardSelection:
         pooled = whole.pooled_temperatures()
         rows, one = (refit(problem, damper) for problem in (whole, pooled))
         pays = delta_bic(one, rows)
-        if pays <= self.config.adopt_bic and not damper.effects:
+        if pays <= self.config.adopt_bic and not one.effects:
             drifts = tuple(name for name, effect in library().items() if effect.place == "material")
             tried = candidates(pooled, one, (*self.config.forbid, *drifts), self.jobs)
             pays -= min((c.delta_bic for c in tried), default=0.0)
@@ -288,7 +292,7 @@ class _ForwardSelection:
                 again = candidate(whole, refit(whole, each.fitted.damper.without_effects(name)), library()[name])
                 if again.fitted.misfit < found[each.effect].fitted.misfit - thresholds.STUCK_MISFIT:
                     damper = again.fitted.damper
-                    effects = {key: damper.effects[key] for key in (*current.effects, each.effect)}
+                    effects = {key: damper.effects[key] for key in (*whole.law, *current.effects, each.effect)}
                     better = refit(whole, damper.model_copy(update={"effects": effects}))
                     found[each.effect] = as_candidate(whole, current, each.effect, better)
         if all(found[c.effect] is c for c in tried):
@@ -316,10 +320,10 @@ class _ForwardSelection:
 
     def _physically_possible(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
         """Return the best supported candidate with possible values of those as good as the first; else the first."""
-        if not against_nature(first.fitted.damper):
+        if not first.fitted.unphysical:
             return first
         alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
-        return self._best_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
+        return self._best_supported([c for c in alike if not c.fitted.unphysical]) or first
 
     def _candidates(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
@@ -398,9 +402,29 @@ class _ForwardSelection:
             self.steps.append(replace(step, rivals=acceptance.rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
+        self._begin_law_afresh()
         self.choose_temperature_axis()
         for name in self.current.effects[len(self.config.force) : -1]:
             self._drop_needless(name, chosen.effect)
+
+    def _begin_law_afresh(self) -> None:
+        """Fit the law of the element anew to what the adopted effects leave of the forces, where a gap remains.
+
+        Alone it bends towards what is missing, as the knees towards a stop, and no descent leads back from there.
+        """
+        whole, current = self.evidence.whole, self.current
+        if knee.EFFECT.name not in whole.law or not self.evidence.gap_is_significant(current, self.config):
+            return
+        law = law_beside(self.evidence.campaign, current.damper, current.effects)
+        if law is None:
+            return
+        of_law = {name: law.effects[name] for name in law.effects if name in (*whole.law, *fitted_laws())}
+        effects = {**current.damper.effects, **of_law}
+        damper = current.damper.model_copy(update={"base": law.base, "effects": effects})
+        again = refit(whole.started_at(damper), damper, thresholds.MOST_EVALUATIONS_OF_BEST)
+        if again.misfit < current.misfit - thresholds.STUCK_MISFIT:
+            log.info("diagnose: the law begun afresh, misfit %.4g in the place of %.4g", again.misfit, current.misfit)
+            self._reweight(again)
 
     def _reweight(self, found: FitResult) -> None:
         """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap.
@@ -465,11 +489,19 @@ class _ForwardSelection:
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
                     self.reasons[each.effect] = self._refused(lenient, each) or acceptance.MAY_BE_CHANCE
-        explained = not self.evidence.gap_is_significant(self.current, self.config)
-        if explained and acceptance.late_or_elastic(self.weigh, self.evidence.whole, self.current, self.config):
+        if self._may_be_late():
             self.reasons["sensor_delay"] = acceptance.LATE_OR_ELASTIC
         undecided = acceptance.MAY_BE_TEST_SCATTER, acceptance.MAY_BE_CHANCE, acceptance.LATE_OR_ELASTIC
         return tuple(name for name, why in self.reasons.items() if why in undecided)
+
+    def _may_be_late(self) -> bool:
+        """Tell whether a late force would do in the place of the oil springs, or beside them in that of a part."""
+        whole, current, config = self.evidence.whole, self.current, self.config
+        late = [c for c in (self.steps[-1].tried if self.steps else ()) if c.effect == "sensor_delay"]
+        if any(acceptance.late_beside_springs(c, whole, current, config) for c in late):
+            return True
+        explained = not self.evidence.gap_is_significant(current, config)
+        return explained and acceptance.late_or_elastic(self.weigh, whole, current, config)
 
     def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
         """Say why a candidate is too little, or spurious; None where the data support it by itself."""
@@ -487,8 +519,35 @@ class _ForwardSelection:
             return
         without = self._without(effect)
         pays = delta_bic(without, current) <= self.config.adopt_bic
-        if not pays or force_change(whole, without, current) < self.config.visible:
+        if not pays or force_change(whole, without.simulated, current.simulated) < self.config.visible:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
+
+
+def law_beside(campaign: Campaign, damper: Damper, effects: Sequence[str]) -> Damper | None:
+    """Fit the knee law to the measured forces less what some effects of a damper make of them.
+
+    Parameters
+    ----------
+    campaign : the records
+    damper : with the law and the effects
+    effects : names of those that are taken off
+
+    Returns
+    -------
+    the damper with the law alone, about the zero of the displacement; None where a base row has no test
+    """
+    without = damper.without_effects(*effects)
+    tests: dict[int, list[Record]] = {}
+    for p in campaign.prepared:
+        if p.constant:
+            force = p.record.force - (predicted_force(damper, p) - predicted_force(without, p))
+            tests.setdefault(nearest_row(damper.base, p), []).append(replace(p.record, force=force))
+    if len(tests) < len(damper.base):
+        return None
+    rows = [(damper.base[i], tests[i]) for i in sorted(tests)]
+    return fitted_knee_damper(
+        [((None, row.voltage_V, row.temperature_degC), records, row.k_N_per_m) for row, records in rows]
+    ).about(0.0)
 
 
 def _ranked_above(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:

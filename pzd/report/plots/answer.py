@@ -148,7 +148,7 @@ def _held_out_bars(context: ReportContext) -> list[_Bar]:
     gap, tests = diagnosis.gap, diagnosis.prediction.by if diagnosis.prediction else ()
     if gap is None:
         return []
-    added, extended = listed([spelled(name) for name in context.diagnosed.damper.effects]), context.damper.extended
+    added, extended = listed([spelled(name) for name in context.damper.added]), context.damper.extended
     plain = tuple(test.W_s_plain for test in tests)
     bars = [_Bar(context.damper.baseline_name, gap.before, BASELINE, None if extended else gap.standard_error, plain)]
     if extended:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from pzd.artefacts import ForceRow
 from pzd.damper.confounders import known
+from pzd.damper.effect import Parameter
+from pzd.damper.model import Damper
 from pzd.quantities import VOLTAGE
 from pzd.report import tables
 from pzd.report.blocks import Block, Notes, Paragraph, Pictures, Section, TextTable, amount, galleries, listed
@@ -28,6 +30,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
         title = "The simple model: T0, C and k of the Bingham element alone, standing in for what it lacks"
         alone = tables.parameters(context.damper.baseline_parameters, context.control, title, fold=0)
         blocks.append(alone.without("setting").block())
+    if context.damper.extended and context.damper.fitted_law:
+        blocks.append(_law_refitted(context))
     blocks += galleries(pictures["damper"])
     blocks += [_force(context)] if context.table.force else []
     blocks += _settings_blocks(context)
@@ -47,7 +51,9 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
 def _intro(context: ReportContext) -> str:
     effects = context.diagnosed.damper.effects
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
-    origin = "What belongs to the knee law stands" if context.damper.fitted_law else "What was missing stands"
+    what = ["what belongs to the knee law"] if context.damper.fitted_law else []
+    what += ["what was missing"] if context.damper.extended else []
+    origin = f"{listed(what)} {'stand' if len(what) > 1 else 'stands'}".capitalize()
     beside = f" {origin} beside it: {listed(laws)}." if laws else ""
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
@@ -61,6 +67,30 @@ def _knee_blocks(context: ReportContext) -> Iterator[Block]:
     found = context.identified.knees
     shown = (*tables.knee(found, context.control), tables.knee_prediction(found, context.control))
     return (table.block() for table in shown if table.rows)
+
+
+def _law_refitted(context: ReportContext) -> TextTable:
+    """Return the parameters of the knee law as identify fitted it, and beside what was missing."""
+    dampers = context.diagnosed.baseline, context.diagnosed.damper
+    rows = [(name, p) for name in dampers[0].effects for p in known()[name].parameters]
+
+    def given(damper: Damper) -> Callable[[tuple[str, Parameter]], Cell]:
+        def cell(row: tuple[str, Parameter]) -> Cell:
+            name, parameter = row
+            values = np.atleast_1d(damper.effects[name].get(parameter.name, parameter.neutral)).tolist()
+            return ", ".join(amount(value, parameter.unit) for value in values)
+
+        return cell
+
+    return Table(
+        "The knee law alone, and fitted again beside what was missing, as the table of force and the rides have it",
+        (
+            Column("parameter", "parameter", value=lambda row: f"{row[1].name}: {row[1].meaning}"),
+            Column("alone", "alone", value=given(dampers[0])),
+            Column("beside", "beside what was missing", value=given(dampers[1])),
+        ),
+        rows,
+    ).block()
 
 
 def _parameters(context: ReportContext) -> TextTable:

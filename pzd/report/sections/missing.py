@@ -37,7 +37,7 @@ _FOLD = 6
 def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
     """Return the section on the gap between measured and simulated force, and where it lies."""
     element = (
-        "The knee law has dry friction T0, and bleed, knee and blow-off of each direction"
+        "The knee law has dry friction, and bleed, knee and blow-off of each direction"
         if context.damper.fitted_law
         else "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C"
     )
@@ -103,8 +103,6 @@ def verdict(context: ReportContext) -> str:
     elif diagnosis.verdict == "none":
         name = context.damper.baseline_name
         text = f"Nothing is missing: what the {name} leaves is within the noise and the scatter between tests"
-    elif context.damper.fitted_law:
-        text = "The knee law leaves a gap that repeats, and no effect was looked for beside it"
     else:
         for_prediction = {name for name, each in diagnosis.support.items() if each.added}
         known = [name for name in diagnosis.effects if name not in for_prediction]

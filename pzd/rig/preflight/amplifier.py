@@ -14,12 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry
-from pzd.record import Array, is_constant, voltage_scale
+from pzd.record import MAD_TO_SIGMA, Array, is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.force import best_delay
 from pzd.rig.preflight.reference import WORTH, ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
 from pzd.rig.preflight.sensors import coarse_step
-from pzd.signals.cycles import MEDIAN_OF_NORMAL
 
 WORTH_OF_RANGE = 4e-5
 """As `WORTH`, beyond noise, for a range that ends.
@@ -68,7 +67,7 @@ def _noise(test: PreflightRecord, section: Section) -> float:
     if test.cycles is None:
         return 0.0
     apart = np.diff(test.cycles.fold(test.record.time, test.record.force), axis=0)
-    deviation = float(np.median(np.abs(apart))) / MEDIAN_OF_NORMAL
+    deviation = MAD_TO_SIGMA * float(np.median(np.abs(apart)))
     return 0.5 * deviation**2 * np.count_nonzero(section.shown) / section.squares
 
 

@@ -143,7 +143,7 @@ TRIES = 61
 NARROWED = 21
 """and then between the neighbours of the best, so often that they lie closer than half a sample."""
 ASKED_BY = 0.5
-"""Least share of the tests that would show a delay, and ask for it: in fewer it is a law that is missing."""
+"""Share of the tests that would show a delay of which more have to ask for it: else it is a law that is missing."""
 ALIKE_WIDTH = 1.5
 """Ratio up to which two motions are as fast as one another, and of as many frequencies."""
 ALIKE_DELAYS = 0.25
@@ -216,7 +216,7 @@ def drop_contradicting_delays(entries: tuple[RecordEntry, ...]) -> tuple[RecordE
 
     def contradicted(entry: RecordEntry) -> bool:
         asked = [bool(_delays(other)) for other in entries if _would_show_it(entry, other)]
-        return entry.setting in different or sum(asked) < ASKED_BY * len(asked)
+        return entry.setting in different or sum(asked) <= ASKED_BY * len(asked)
 
     return tuple(
         entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "delay")})

@@ -172,6 +172,8 @@ def _stands_away(values: Array, run: Rows, least: float) -> bool:
     line = np.polyfit(near - first, values[near], 1)
     rough = float(np.abs(values[near] - np.polyval(line, near - first)).max())
     off = float(np.abs(values[run] - np.polyval(line, run - first)).min())
+    if np.abs(values[near] - values[first]).min() <= least:  # noise of a coarse channel: the next level is about
+        return False
     return off > max(least, 3.0 * rough, OFF * noise_beside_motion(values[rows]), OFF_SHARE * float(np.ptp(values)))
 
 

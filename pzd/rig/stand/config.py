@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.damper.confounders import known
+from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.record import Array
@@ -331,7 +332,7 @@ def _needs_voltage(damper: Damper) -> str | None:
     if len({row.voltage_V for row in damper.base}) > 1:
         return "the damper has base rows at several voltages"
     for name, values in damper.effects.items():
-        if "at_voltage_V" in values or known()[name].place == "drive":
+        if NODE_VOLTAGES in values or known()[name].place == "drive":
             return f"{name} depends on the voltage"
     return None
 

@@ -54,3 +54,19 @@ def test_the_force_that_fades_in_a_long_test_is_followed_over_its_cycles(rng: np
         assert followed == pytest.approx((1.0 - lost * middles) / (1.0 - lost * middles[0]), abs=0.02)
     assert course.verdict != "unchanged"
     assert "load_cell_gain" in course.rivals  # at one level it cannot be told from all of T0, C and k
+
+
+def test_what_stays_as_it_is_passes_its_limits_and_fails_those_that_it_never_met(rng: np.random.Generator) -> None:
+    """A good part is told good: a quantity of the first damper needs no change to be held to its limits."""
+    gas = 3000.0
+    damper = drawn_damper(rng, voltages=(0.0,)).with_effect("gas_spring", {"k_g": gas})
+    damping = damper.base[0].C_Ns_per_m
+    states = [replace(state_of(name, campaign(damper, rng)), damper=damper) for name in ("first", "second")]
+    tolerance = {"C": (0.9 * damping, 1.1 * damping), "gas_spring.k_g": (0.8 * gas, 1.2 * gas)}
+
+    def passed(tolerance: dict[str, tuple[float, float]]) -> bool | None:
+        changes = ChangesConfig(tolerance=tolerance)
+        return followed_over(states, DiagnoseConfig(), IdentifyConfig(), changes, Control()).course.pass_
+
+    assert passed(tolerance) is True
+    assert passed(tolerance | {"gas_spring.k_g": (1.3 * gas, 1.5 * gas)}) is False

@@ -1,0 +1,42 @@
+"""The friction of a seal beside T0: it turns round with the rod, and takes no name from what is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import TWO, all_but, damper_of, diagnosed, sines
+
+from pzd.artefacts import Diagnosed
+from pzd.record import Record
+
+TESTS = ((0.5, 0.01), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02), (3.0, 0.015))
+LOOKED_FOR = ("asymmetry", "rounded_yield", "preload_offset", "lash", "stribeck_friction", "sensor_delay")
+
+
+def rubbed(records: tuple[Record, ...], friction: float, speed: float = 5e-4) -> tuple[Record, ...]:
+    """The same tests with the friction of a seal on the rod [N], which has turned at so many m/s."""
+    return tuple(replace(r, force=r.force + friction * np.tanh(r.velocity / speed)) for r in records)
+
+
+def told(rng: np.random.Generator, friction: float, **effects: dict[str, float]) -> Diagnosed:
+    records = sines(damper_of(TWO, **effects), rng, TWO, tests=TESTS, noise=0.003, colour=0.5)
+    return diagnosed(rubbed(records, friction), forbid=all_but(*LOOKED_FOR))
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("friction", [15.0, 30.0])
+def test_an_asymmetry_is_named_beside_the_friction_of_a_seal(friction: float, rng: np.random.Generator) -> None:
+    found = told(rng, friction, asymmetry={"alpha": 0.15})
+    diagnosis = found.diagnosis
+    assert (diagnosis.verdict, diagnosis.effects, diagnosis.rivals) == ("named", ("asymmetry",), ()), diagnosis.reason
+    assert diagnosis.parameters["asymmetry"]["alpha"].value == pytest.approx(0.15, rel=0.03)
+    assert found.damper.effects["seal"]["F_s"] == pytest.approx(friction, rel=0.25)
+    assert "beside the friction of a seal" in diagnosis.reason
+
+
+def test_where_no_seal_rubs_none_is_there(rng: np.random.Generator) -> None:
+    found = told(rng, 0.0, asymmetry={"alpha": 0.15})
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("named", ("asymmetry",)), found.diagnosis.reason
+    assert "seal" not in found.damper.effects
