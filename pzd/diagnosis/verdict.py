@@ -159,7 +159,7 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
         return _nothing_adopted(sizes[0], chances[0], selection, config)
     whole = gap_with_nuisances(before), gap_with_nuisances(after)
     change = f"{' and '.join(selection.adopted)}: {_gap_change(selection, sizes, whole, config)}"
-    if chances[1] < config.significance and _gap_remains(sizes, config):
+    if leaves_too_much(sizes, chances[1], config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         hardly = sizes[1] > thresholds.HARDLY_CLOSED * sizes[0]
         return Decision("unexplained", words, None, alike=selection.adopted if hardly else ())
@@ -256,10 +256,17 @@ def _gap_change(
     )
 
 
-def _gap_remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
-    """Whether too much of the gap is left (r.m.s. above the noise): as a share of it, or beyond what is visible."""
+def leaves_too_much(sizes: tuple[float, float], chance: float, config: DiagnoseConfig) -> bool:
+    """Whether what adopted effects leave repeats, and is too much for a name: of the gap, or of what is visible.
+
+    Parameters
+    ----------
+    sizes : gap before and after (r.m.s. above the noise), as shares of peak
+    chance : probability of what is left by noise alone
+    config : thresholds
+    """
     share = sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
-    return share or sizes[1] >= thresholds.LARGE_REMAINDER * config.visible
+    return chance < config.significance and (share or sizes[1] >= thresholds.LARGE_REMAINDER * config.visible)
 
 
 def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:

@@ -38,7 +38,7 @@ from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import base_half_widths, plain_fit, polished, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
-from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, regions, visible_gap
+from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, probability_of_noise, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
@@ -60,6 +60,7 @@ from pzd.diagnosis.verdict import (
     knee_note,
     knee_parameters,
     knee_suffices,
+    leaves_too_much,
     no_prediction_note,
     no_slip_diagnosis,
     nodes_note,
@@ -311,22 +312,34 @@ def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     where the effects have none with it either, or kept-back tests are predicted worse.
     """
     adoption, decision = first.conclusion
-    left = visible_gap(first.campaign.checks(adoption.selection.fitted.damper))
+    selection, checks = adoption.selection, first.campaign.checks
+    left = visible_gap(checks(selection.fitted.damper))
     if decision.verdict != "unexplained" or config.force or first.campaign.law or left > thresholds.SEAL_LEAVES:
         return first
-    scales = adoption.selection.initial_evidence.whole.scales
-    start = {p.name: p.search.starts[0] * p.search.scale(scales) for p in seal.EFFECT.parameters}
-    rows = [row.model_copy(update={"T0_N": max(row.T0_N - start["F_s"], 0.0)}) for row in baseline.base]
-    rubbed = baseline.model_copy(update={"base": tuple(rows)}).with_effect(seal.EFFECT.name, start)
-    again = _judged(replace(first.campaign, law=(seal.EFFECT.name,)), rubbed, config, unit)
-    found, named = again.conclusion
-    if named.verdict not in ("named", "ambiguous") or predicts_worse(found.error, adoption.error):
-        return first
     # The seal takes the place of what looked like another effect, and brings none.
-    sure = {*adoption.selection.adopted} - {*decision.alike}
-    if not {*found.selection.adopted} <= sure or not improves(found.error, adoption.baseline_error, again.validation):
+    sure = tuple(name for name in selection.adopted if name not in decision.alike)
+    campaign = replace(first.campaign, law=(seal.EFFECT.name,))
+    scales = selection.initial_evidence.whole.scales
+    start = {p.name: p.search.starts[0] * p.search.scale(scales) for p in seal.EFFECT.parameters}
+
+    def rubbed(damper: Damper) -> Damper:
+        rows = [row.model_copy(update={"T0_N": max(row.T0_N - start["F_s"], 0.0)}) for row in damper.base]
+        return damper.model_copy(update={"base": tuple(rows)}).with_effect(seal.EFFECT.name, start)
+
+    # Where all of them leave too much beside a seal, so does any part of them: nothing need be searched for.
+    together = rubbed(selection.fitted.damper.without_effects(*decision.alike))
+    beside = campaign.checks(refit(evidence_of(campaign, together).whole, together).damper)
+    sizes = visible_gap(checks(selection.baseline.damper)), visible_gap(beside)
+    if not sure or leaves_too_much(sizes, probability_of_noise(beside), config):
         return first
-    return replace(again, conclusion=(replace(found, baseline_error=adoption.baseline_error), named))
+    again = _judged(campaign, rubbed(baseline), config, unit)
+    found, named = again.conclusion
+    if named.verdict not in ("named", "ambiguous") or not {*found.selection.adopted} <= {*sure}:
+        return first
+    plain = adoption.baseline_error
+    if predicts_worse(found.error, adoption.error) or not improves(found.error, plain, again.validation):
+        return first
+    return replace(again, conclusion=(replace(found, baseline_error=plain), named))
 
 
 def _seal_note(damper: Damper, law: Sequence[str]) -> str:
