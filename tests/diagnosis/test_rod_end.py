@@ -9,10 +9,16 @@ import pytest
 from rod_end import RodEnd, sine
 from synthetic import all_but, coloured, diagnosed
 
-from pzd.artefacts import Diagnosis
+from pzd.artefacts import Diagnosis, Rig
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
+from pzd.quantities import Control
 from pzd.record import Array, Record
 
 JOINT = RodEnd(T0=60.0, C=3000.0, k=1.0e6, gas=180.0, stiffness=0.0, play=3.0e-4)
@@ -68,3 +74,20 @@ def test_without_a_gas_no_joint_is_looked_for(rng: np.random.Generator) -> None:
     found = told([(motion, joint.force(motion)) for motion in (sine(f, x, cycles=8) for f, x in TESTS[1:4])], rng)
     assert (found.verdict, found.effects) == ("named", ("lash",)), found.reason
     assert "mount_play" not in {row.effect for row in found.ranking}
+
+
+def test_a_rod_end_that_has_worn_is_what_changed(rng: np.random.Generator) -> None:
+    """Its play is passed where the gas of the first state is undone, however large it is."""
+
+    def state(name: str, play: float) -> State:
+        motions = [sine(f, x, cycles=8) for f, x in TESTS[:4]]
+        rig = Rig(tuple(record(m, replace(JOINT, play=play).force(m), rng) for m in motions), ())
+        found = State.of(name, rig, identify(IdentifyConfig(), rig, 1), None, Control())
+        whole = Damper(base=(BaseRow(T0_N=JOINT.T0, C_Ns_per_m=JOINT.C, k_N_per_m=JOINT.k),))
+        return replace(found, damper=whole.with_effect("preload_offset", {"F_0": -JOINT.gas}))
+
+    states = state("new", 1e-9), state("worn", JOINT.play)
+    changes = changes_between(*states, DiagnoseConfig(), IdentifyConfig(), Control()).changes
+    assert (changes.verdict, {c.name for c in changes.changes}) == ("changed", {"mount_play"}), changes.reason
+    worn = {c.parameter: c.to for c in changes.changes}
+    assert worn == pytest.approx({"delta": JOINT.play, "F_m": JOINT.gas}, rel=0.1)

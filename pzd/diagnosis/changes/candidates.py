@@ -392,16 +392,19 @@ def _absent(first: FirstState, name: str) -> Candidate:
     def searched(c: Coordinate, x: float) -> float:
         return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
 
+    effect, gas = known_effect(name), force_at_rest(first.damper)
     unscaled = all(c.logarithmic for c in coordinates)
     faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
     several = unscaled and len(coordinates) > 1
 
     def tried(p: Parameter) -> tuple[float, ...]:
+        if effect.beside_gas and p.unit == "N":  # it is passed where the flow undoes the gas
+            return (-gas / (p.search.scale(first.scales) or 1.0),)
         weak = (WEAK,) if unscaled and p.unit == "N s/m" else ()
         starts = p.search.starts_on(first.scales)
         return (*(_closer(starts) if several else starts), *weak, *faint)
 
-    grid = itertools.product(*map(tried, known_effect(name).parameters))
+    grid = itertools.product(*map(tried, effect.parameters))
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
 

@@ -15,7 +15,7 @@ import numpy as np
 from pzd.damper.confounders import known
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import Damper
-from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, excludes, without_laws
+from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate, Coordinate, excludes, without_laws
 from pzd.diagnosis.changes.regression import USUAL_SHARE, Fitted, Regression, Scatter
 from pzd.diagnosis.fit.least_squares import projected_out
 from pzd.diagnosis.search.acceptance import misplaced_end_stop
@@ -64,19 +64,21 @@ class Promise:
 def _scaled(candidate: Candidate, start: Array, step: Array) -> Array:
     """Return a start with its linear coordinates as large as the linearised step makes the difference from 0 to it.
 
-    A force beside the element keeps its shape where all that is force in its parameters grows alike: of a branch the
-    stiffness with the force at which it slips.
+    Those of the unit of the first, which is its size: another one is where it acts. A force beside the element keeps
+    its shape where all that is force in its parameters grows alike: of a branch the stiffness with the force at which
+    it slips.
     """
     if step.size == start.size:  # no difference at the start itself
         return start
     factor = float(np.clip(step[0], *SCALED))
-    beside = _is_beside(candidate.name)
-    return np.array(
-        [
-            x * factor if not c.logarithmic else x + np.log(factor) * (beside and c.unit.startswith("N"))
-            for c, x in zip(candidate.coordinates, start, strict=True)
-        ]
-    )
+    beside, size = _is_beside(candidate.name), candidate.coordinates[0]
+
+    def grown(c: Coordinate, x: float) -> float:
+        if c.logarithmic:
+            return x + float(np.log(factor)) * (beside and c.unit.startswith("N"))
+        return x * factor if c.unit == size.unit and c.name == size.name else x
+
+    return np.array([grown(c, x) for c, x in zip(candidate.coordinates, start.tolist(), strict=True)])
 
 
 def _is_beside(name: str) -> bool:
