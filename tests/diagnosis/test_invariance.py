@@ -102,14 +102,29 @@ def test_a_sided_effect_changes_sides_with_the_rig_and_nothing_else(
     follows(diagnosed(tuple(map(change, records))), found, factor, force)
 
 
+AT_ONCE = (
+    ("mirrored", "3.7 times as strong", "an hour later"),
+    ("mirrored", "a fifth as strong", "an hour later"),
+)
+"""Moves that an effect goes through at once, in turn: what one of them breaks, all of them do."""
+
+
 @pytest.mark.ci
-@pytest.mark.parametrize("effect", [None, *TRUTHS])
-def test_every_verdict_follows_its_rig(rng: np.random.Generator, effect: str | None) -> None:
+@pytest.mark.parametrize(
+    ("effect", "moves"), [(effect, AT_ONCE[i % len(AT_ONCE)]) for i, effect in enumerate((None, *TRUTHS))]
+)
+def test_every_verdict_follows_its_rig(rng: np.random.Generator, effect: str | None, moves: tuple[str, ...]) -> None:
     hidden = {} if effect is None else {effect: TRUTHS[effect]}
     records = sines(damper_of(TWO, **hidden), rng, TWO, jitter=0.01)
-    found = diagnosed(records)
-    for change, factor, force in MOVES.values():
-        follows(diagnosed(tuple(map(change, records))), found, factor, force)
+    changes, factors, forces = zip(*(MOVES[move] for move in moves), strict=True)
+    moved = records
+    for change in changes:
+        moved = tuple(map(change, moved))
+
+    def factor(name: str, unit: str) -> float:
+        return float(np.prod([each(name, unit) for each in factors]))
+
+    follows(diagnosed(moved), diagnosed(records), factor, float(np.prod(forces)))
 
 
 # --- The zero of the displacement is arbitrary
