@@ -6,6 +6,7 @@ quantity cannot carry two names or two units.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 GRAVITY = 9.80665
@@ -65,6 +66,9 @@ CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERAT
 first five are in every file."""
 
 
+_VOLTAGE_ALONE = re.compile(rf"\b{VOLTAGE.name}(?=s?\b)")  # and not as a part of the name of a policy or a column
+
+
 @dataclass(frozen=True)
 class Control:
     """The control signal of the valve: a voltage unless the config says otherwise."""
@@ -82,6 +86,16 @@ class Control:
     def own_unit(self, unit: str) -> str:
         """Return a unit under this control: V becomes the unit of the control signal."""
         return self.unit if unit == VOLTAGE.unit else unit
+
+    def told(self, text: str) -> str:
+        """Return a text in which this control signal stands where it says voltage.
+
+        Examples
+        --------
+        >>> Control("current", "A").told("less than at the best fixed voltage (best_fixed_voltage)")
+        'less than at the best fixed current (best_fixed_voltage)'
+        """
+        return text if self == Control() else _VOLTAGE_ALONE.sub(self.name.replace("_", " "), text)
 
     def renamed(self, column: str) -> str:
         """Return the name of a canonical column under this control: voltage_1_V -> current_1_A."""

@@ -93,7 +93,9 @@ class Campaign:
 
     def parallel_map(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
         """Apply a function to every item, `jobs` of them at the same time."""
-        with ThreadPoolExecutor(max(self.jobs, 1)) as pool:
+        if self.jobs <= 1:
+            return tuple(map(function, items))
+        with ThreadPoolExecutor(self.jobs) as pool:
             return tuple(pool.map(function, items))
 
 

@@ -211,7 +211,9 @@ def _searched(
             beside += temperature_note(baseline.base, selection.initial_evidence.whole.scales.speed)
         diagnosis = Diagnosis(
             verdict=decision.verdict,
-            reason="".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before))),
+            reason=control.told(
+                "".join((decision.reason, beside, judged.zeros, campaign.budget.note, *limits, _hum(before)))
+            ),
             effects=selection.adopted,
             confidence=decision.confidence,
             gap=held_out_gap(selection, validation if adoption.by_criterion else None),

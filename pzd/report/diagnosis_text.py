@@ -63,7 +63,7 @@ def diagnosis_lines(
     Parameters
     ----------
     diagnosis : the artefact of diagnose
-    control : the control signal, for its unit
+    control : the control signal, for its name and unit
     every_test : whether the prediction of each held-out test and voltage is listed too
     hypotheses : shapes of the residual force, if any were looked for
     """
@@ -89,7 +89,7 @@ def diagnosis_lines(
     lines += [*_rejected(diagnosis), *(_hypotheses(hypotheses) if hypotheses else ())]
     if diagnosis.next_test:
         lines.append(next_test_line(diagnosis.next_test, unit))
-    return lines
+    return [control.told(line) for line in lines]
 
 
 def headline(diagnosis: Diagnosis) -> str:

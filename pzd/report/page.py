@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -241,7 +241,7 @@ def answer(context: ReportContext) -> str:
         text = f"The {name} lacks {listed(names)}{sure}"
     elif diagnosis.verdict == "ambiguous" and diagnosis.effects and diagnosis.rivals:
         either = listed([spelled(effect) for effect in (*diagnosis.effects, *diagnosis.rivals)], "or")
-        text = f"The {name} lacks {either}, and these tests do not settle which"
+        text = f"The {name} lacks {either}, alone or together; these tests do not settle which"
     elif diagnosis.verdict == "none":
         text = f"The {name} describes this damper as well as these tests can tell"
     else:
@@ -261,7 +261,7 @@ def told(context: ReportContext) -> tuple[str, ...]:
     """Return what a terminal says at the end: the answer, and how the rides compare, a sentence or two a line."""
     comfort = _comfort(context) if context.ridden else None
     lines = [answer(context), *([f"{comfort.question} {sentence(comfort.answer)}", comfort.detail] if comfort else [])]
-    return tuple(typewritten(line) for line in lines if line)
+    return tuple(context.control.told(typewritten(line)) for line in lines if line)
 
 
 # --- The page ---
@@ -292,7 +292,8 @@ def page(context: ReportContext, jobs: int = 1) -> str:
     )
     about = tuple((name, str(value)) for name, value in context.config.about.items())
     first = Opening(answer(context), tuple(picture for row in drawn["answer"] for picture in row), about)
-    return render(title, cards(context), _assumed(context), sections, opening=first, explorer=explorer_of(context))
+    shown = title, cards(context), _assumed(context), sections
+    return render(*shown, opening=first, explorer=explorer_of(context), told=context.control.told)
 
 
 def _assumed(context: ReportContext) -> tuple[str, ...]:
@@ -314,6 +315,7 @@ def render(
     footer: str = _FOOTER,
     opening: Opening | None = None,
     explorer: Explorer | None = None,
+    told: Callable[[str], str] | None = None,
 ) -> str:
     """Fill the template of the report.
 
@@ -326,6 +328,7 @@ def render(
     footer : its last line
     opening : what stands first, before the headline
     explorer : of the records
+    told : gives a text as it is to be told, see `Control.told`
     """
     runs = scripts() if explorer else ()
     texts = {
@@ -340,16 +343,20 @@ def render(
         "policy": policy(runs),
         "wide": WIDE,
     }
-    return filled("pzd.report", "report.html", texts)
+    return filled("pzd.report", "report.html", texts, told)
 
 
-def filled(package: str, template: str, texts: Mapping[str, object]) -> str:
-    """Fill a template in the folder `templates` of a package, which escapes every text."""
+def filled(package: str, template: str, texts: Mapping[str, object], told: Callable[[str], str] | None = None) -> str:
+    """Fill a template in the folder `templates` of a package, which escapes every text, as it is to be told."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    def finalized(value: object) -> object:
+        return told(value) if told is not None and type(value) is str else value  # and not in a script
 
     environment = Environment(
         loader=PackageLoader(package, "templates"),
         autoescape=True,
+        finalize=finalized,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

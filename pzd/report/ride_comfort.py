@@ -219,7 +219,7 @@ class RatedRides:
 
     def policy_name(self, row: SummaryRow) -> str:
         """Return the policy of a ride in words."""
-        return spelled(row.policy).removesuffix(" c")
+        return self.control.told(spelled(row.policy)).removesuffix(" c")
 
     def policy_label(self, row: SummaryRow) -> str:
         """Return the policy of a ride in words, with what it held constant."""

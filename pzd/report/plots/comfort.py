@@ -238,7 +238,7 @@ def trade_off_panel(
     ax.set_ylim(_widened(*ax.get_ylim()))
     _write_names(ax, context, rows, best)
     values = "; ".join(
-        f"{spelled(row.policy)} {amount(a_w, 'm/s2')} and {amount(load, 'N')}"
+        f"{context.control.told(spelled(row.policy))} {amount(a_w, 'm/s2')} and {amount(load, 'N')}"
         for row, load, a_w in zip(rows, loads, comfort, strict=True)
     )
     title = f"Comfort against wheel load, {context.rated.road_label(road)}"
@@ -272,7 +272,7 @@ def _write_names(ax: Axes, context: ReportContext, rows: Sequence[SummaryRow], b
     for row, place in zip(rows, places, strict=True):
         colour, _ = _trade_off_style(context, row)
         ax.annotate(
-            spelled(row.policy),
+            context.control.told(spelled(row.policy)),
             (row.rms_wheel_load_N, context.rated.a_w(row)),
             (1.06, place),
             textcoords="axes fraction",

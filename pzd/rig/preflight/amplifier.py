@@ -249,18 +249,54 @@ def _cut(section: Section, share: float, zooms: int = 2) -> tuple[ReferenceFit, 
     return replace(fit, residual=(fit.residual * between.squares + flat) / section.squares), missing
 
 
+AS_MUCH = 1.5
+"""Multiple of the share that is missing in a test of less force, up to which a test of more bends over as that does.
+
+Reason: what is missing beneath the limit of an amplifier grows many times faster than the force."""
+
+
 def drop_contradicting_ranges(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
-    """Drop the ranges that a record of a larger force does not end at: a damper gives way there, and no amplifier.
+    """Drop the ranges that a record of a larger force goes beyond: a damper gives way there, and no amplifier.
 
     By the peaks: where every test is cut off at one force, the faster has the larger r.m.s., and not the larger force.
+    What bends over alike in a test of less force, far from the limit, does so in the damper as well.
     """
-    free = [e.force_peak_N or 0.0 for e in entries if all(f.check != "range" for f in e.findings)]
+    free = [e.force_peak_N or 0.0 for e in entries if _missing_share(e) is None]
+    largest = max((e.force_peak_N or 0.0 for e in entries), default=0.0)
+
+    def contradicted(entry: RecordEntry) -> bool:
+        peak, missing = entry.force_peak_N or 0.0, _missing_share(entry)
+        beyond = (1.0 + LEAST_CUT) * peak < max(free, default=0.0)
+        return missing is not None and (beyond or (1.0 + LEAST_CUT) * _soft_limit(missing) * peak < largest)
+
+    bends = max((_missing_share(e) or 0.0 for e in entries if contradicted(e)), default=0.0)
     return tuple(
         entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "range")})
-        if (1.0 + LEAST_CUT) * (entry.force_peak_N or 0.0) < max(free, default=0.0)
+        if contradicted(entry) or (_missing_share(entry) or np.inf) <= AS_MUCH * bends
         else entry
         for entry in entries
     )
+
+
+def _missing_share(entry: RecordEntry) -> float | None:
+    """Return how much is missing at the peak of a record whose range ends, as a share of it; None of any other."""
+    found = next((f.size for f in entry.findings if f.check == "range"), None)
+    return None if found is None or not entry.force_peak_N else found / entry.force_peak_N
+
+
+def _soft_limit(missing: float) -> float:
+    """Compute the limit of a soft amplifier, as a multiple of the peak that it shows, from what is missing there.
+
+    Equation: atanh(1/s) s = 1 + m, see `_saturation`
+
+    Examples
+    --------
+    >>> round(_soft_limit(0.0986), 3)  # it shows half of its limit
+    2.0
+    """
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda s: np.arctanh(1.0 / s) * s - 1.0 - missing, 1.0 + 1e-12, 1e3))
 
 
 CHECKS = (amplifier,)

@@ -34,6 +34,12 @@ ALIKE_OFFSETS = 0.3
 """Offsets that differ by less than this share of the usual one are alike: friction at rest moves them so far."""
 LEAST_RECORDS = 3
 """Records from which there is a usual offset."""
+STEADY_OFFSETS = 0.5
+"""Share of the largest offset that the least has, of one sign in all records, where most is there at any speed."""
+A_GAS_PUSHES = (
+    "; a gas pushes the rod out, a negative force where extension is positive: check which way is rebound "
+    "(sign: {displacement: -1, force: -1} turns both)"
+)
 BY_CHANCE = 0.02
 """P value below which offsets rise or fall with the speed by no chance: five in order throughout have 1/60."""
 OF_FEW = 0.34
@@ -69,9 +75,9 @@ def offset(test: PreflightRecord) -> Iterator[Finding]:
 def explain_offsets(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
     """Reword the offset of each record by those of the other records of its setting.
 
-    A preload or a gas force is the damper's: the same in every record. Where rebound is unlike compression the offset
-    goes with the speed. A tare may change from file to file, and a force and a displacement that are both turned over
-    show the offset with the other sign.
+    A preload or a gas force is the damper's: the same in every record, and seldom in the direction of rebound. Where
+    rebound is unlike compression the offset goes with the speed, from nothing at rest. A tare may change from file to
+    file, and a force and a displacement that are both turned over show the offset with the other sign.
     """
     return tuple(_explained(entry, [o for o in entries if o.setting == entry.setting]) for entry in entries)
 
@@ -83,12 +89,16 @@ def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
     any_usual = np.mean(np.abs(np.array(offsets) - usual) <= ALIKE_OFFSETS * abs(usual)) > 0.5
     if mine == 0.0 or len(offsets) < LEAST_RECORDS:
         return entry
+    alike = f"in all {len(offsets)} records of this setting, as a preload or a gas force is"
+    turned = A_GAS_PUSHES if usual > 0.0 else ""
+    chance = _in_order_of(entries, "velocity_rms_m_per_s")
     if np.ptp(offsets) <= ALIKE_OFFSETS * abs(usual):
-        follows = f"{OFFSET_MEANS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
-    elif (chance := _in_order_of(entries, "velocity_rms_m_per_s")) <= BY_CHANCE:
-        follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
-    elif _in_order_of(entries, "force_rms_N") <= BY_CHANCE:
-        follows = "it goes with the force of the test, as where rebound is unlike compression; no tare does that"
+        follows = f"{OFFSET_MEANS}; alike {alike}{turned}"
+    elif chance <= BY_CHANCE or _in_order_of(entries, "force_rms_N") <= BY_CHANCE:
+        goes = f"goes with the {'speed' if chance <= BY_CHANCE else 'force'} of the test, as where rebound is unlike "
+        follows = f"it {goes}compression; no tare does that"
+        if min(np.multiply(offsets, np.sign(usual))) >= STEADY_OFFSETS * max(np.abs(offsets)):
+            follows = f"most of it is there {alike}; the rest {goes}compression{turned}"
     elif not any_usual and chance <= OF_FEW:
         follows = f"{FEW_IN_ORDER}; else a tare that changed"
     elif not any_usual:
