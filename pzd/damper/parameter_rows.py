@@ -7,7 +7,7 @@ drive; rows at any voltage, linear between the nodes of a damper. Beyond the out
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,7 @@ from pzd.damper.compiled.columns import (
 )
 from pzd.damper.compiled.kernels import T0, C, K, Row, follow_voltage, interpolate, row_of
 from pzd.damper.confounders import module_of
-from pzd.damper.effect import NODE_VOLTAGES, arguments, functions
+from pzd.damper.effect import NODE_VOLTAGES, EffectValues, arguments, functions
 from pzd.damper.element import STIFFEST
 from pzd.damper.model import BaseRow, Damper
 from pzd.record import CONSTANT_SHARE, Array
@@ -244,7 +244,12 @@ def element_rows(damper: Damper, effective: Array | None, temperature: Array | f
 
 def parallel_rows(damper: Damper, effective: Array | None) -> Array | None:
     """Return the (n, m) or (1, m) rows of the parallel effects; None without any."""
-    return columns_of(damper, PARALLEL, effective) if any(name in damper.effects for name, _ in BESIDE) else None
+    return columns_of(damper, PARALLEL, effective) if acts_beside(damper.effects) else None
+
+
+def acts_beside(effects: Container[str]) -> bool:
+    """Whether one of some effects is a force beside the element, by their names."""
+    return any(name in effects for name, _ in BESIDE)
 
 
 def constant_rows(
@@ -252,8 +257,7 @@ def constant_rows(
 ) -> tuple[Array, Array | None]:
     """Return the (1, r) and (1, m) rows of the element and the parallel effects at constant voltage and temperature."""
     row = np.array([[friction, damping, stiffness, *_values(STROKE_AND_FLOW, effects)]])
-    has_parallel = any(name in effects for name, _ in BESIDE)
-    return row, np.array([_values(PARALLEL, effects)]) if has_parallel else None
+    return row, np.array([_values(PARALLEL, effects)]) if acts_beside(effects) else None
 
 
 def _values(columns: Sequence[Column], effects: Mapping[str, Mapping[str, float]]) -> list[float]:
@@ -262,6 +266,10 @@ def _values(columns: Sequence[Column], effects: Mapping[str, Mapping[str, float]
 
 
 # --- Rows at any voltage, linear between the nodes of a damper ---
+
+
+NodeValue = float | tuple[float, ...] | Array
+"""One value at every voltage, or one for each node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,14 +290,48 @@ def nodes_of(damper: Damper, temperature: float | None) -> DamperNodes:
     """Return the rows of a damper at one temperature [degC] and at all its voltages."""
     listed = [values[NODE_VOLTAGES] for values in damper.effects.values() if NODE_VOLTAGES in values]
     voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
-    rows = element_rows(damper, voltages, temperature)
-    parallel = columns_of(damper, PARALLEL, voltages)
-    return DamperNodes(
-        voltages,
-        np.broadcast_to(rows, (voltages.size, rows.shape[1])).copy(),
-        np.broadcast_to(parallel, (voltages.size, parallel.shape[1])).copy(),
-        drive_row_of(damper),
-    )
+    effects = {name: _interpolated(values, voltages) for name, values in damper.effects.items()}
+    return nodes_with(voltages, bingham_parameters(damper, voltages, temperature), effects)
+
+
+def _interpolated(values: EffectValues, voltages: Array) -> dict[str, float | Array]:
+    """Return the parameters of an effect at (m,) voltages: (m,) where it has one value per voltage."""
+    own = np.atleast_1d(values.get(NODE_VOLTAGES, 0.0))
+    return {
+        name: np.interp(voltages, own, value) if isinstance(value, tuple) else value
+        for name, value in values.items()
+        if name != NODE_VOLTAGES
+    }
+
+
+def nodes_with(voltages: Array, base: Array, effects: Mapping[str, Mapping[str, NodeValue]]) -> DamperNodes:
+    """Assemble the rows of a damper at some voltages.
+
+    Parameters
+    ----------
+    voltages : (m,) rising [V]
+    base : (m, 3) or (1, 3) T0 [N], C [N s/m] and k [N/m] there
+    effects : values by effect and parameter, (m,) where they differ by voltage
+
+    Raises
+    ------
+    ValueError : when a parameter of the drive has one value per voltage
+    """
+    rows = np.empty((voltages.size, 3 + len(STROKE_AND_FLOW)))
+    rows[:, :3] = base
+    _fill_columns(rows[:, 3:], STROKE_AND_FLOW, effects)
+    parallel, drive = np.empty((voltages.size, len(PARALLEL))), np.empty((1, len(DRIVE)))
+    _fill_columns(parallel, PARALLEL, effects)
+    _fill_columns(drive, DRIVE, effects)
+    return DamperNodes(voltages, rows, parallel, drive[0])
+
+
+def _fill_columns(rows: Array, columns: tuple[Column, ...], effects: Mapping[str, Mapping[str, NodeValue]]) -> None:
+    """Fill (m, c) rows with the values of c columns, neutral where the effect is missing."""
+    rows[:] = [NEUTRAL[column] for column in columns]
+    for place, (name, parameter) in enumerate(columns):
+        if name in effects:
+            rows[:, place] = effects[name].get(parameter, NEUTRAL[name, parameter])
 
 
 @compiled

@@ -12,9 +12,10 @@ import numpy as np
 
 from pzd.damper.confounders import known
 from pzd.damper.effect import NODE_VOLTAGES, Effect, EffectValues, Parameter, Scales, Search
+from pzd.damper.element import STIFFEST
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.parameter_rows import DamperNodes, nodes_of, rows_per_voltage
+from pzd.damper.parameter_rows import DamperNodes, nodes_of, nodes_with, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.fit.element_coordinates import ElementCoordinates
 from pzd.record import Array
@@ -328,10 +329,19 @@ class Point:
         """Return the rows at the nodes of voltage, at one temperature [degC]; cached."""
         problem = self.problem
         if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
-            temperature = None
+            return self._nodes
         if temperature not in self._nodes_by_temperature:
             self._nodes_by_temperature[temperature] = nodes_of(self.damper, temperature)
         return self._nodes_by_temperature[temperature]
+
+    @cached_property
+    def _nodes(self) -> DamperNodes:
+        """Rows at the nodes of voltage, where they are the same at every temperature: without a damper to check."""
+        base = np.empty_like(self.base)
+        base[list(self.problem.nodes)] = self.base
+        if len(base) > 1:
+            base[:, 2] = np.minimum(base[:, 2], STIFFEST)  # between two infinite ones nothing is linear
+        return nodes_with(np.array(self.problem.voltages), base, self.effects)
 
     def _node_voltages(self, effect: str) -> dict[str, tuple[float, ...]]:
         return {NODE_VOLTAGES: self.problem.voltages} if effect in self.problem.per_voltage else {}

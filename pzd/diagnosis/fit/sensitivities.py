@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,19 +119,27 @@ def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
         factors = parameter_rows.material_factors(given, temperature, point.problem.reference_temperature)
         rows = np.repeat(rows, len(factors), axis=0)
         rows[:, : len(ELEMENT)] *= factors
-    sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
-    return KernelInputs(rows, parallel, sensors, point.displacement_zero)
+    return KernelInputs(rows, parallel, _sensors(effects), point.displacement_zero)
 
 
 def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
-    damper, temperature = point.damper, constant_value(o.motion.temperature)
-    effective = o.effective_voltage(parameter_rows.drive_row_of(damper).tobytes())
-    parallel, sensors = parameter_rows.parallel_rows(damper, effective), sensors_of(damper)
+    temperature = constant_value(o.motion.temperature)
     if temperature is not None and temperature.size > 1:
+        damper = point.damper
+        effective = o.effective_voltage(parameter_rows.drive_row_of(damper).tobytes())
         rows = parameter_rows.element_rows(damper, effective, temperature)
-        return KernelInputs(rows, parallel, sensors, point.displacement_zero)
+        parallel = parameter_rows.parallel_rows(damper, effective)
+        return KernelInputs(rows, parallel, sensors_of(damper), point.displacement_zero)
     nodes = point.nodes(None if temperature is None else float(temperature[0]))
-    return KernelInputs(nodes.rows, parallel, sensors, point.displacement_zero, nodes.voltages, effective)
+    effective, along = o.effective_voltage(nodes.drive.tobytes()), None
+    if parameter_rows.acts_beside(point.effects):
+        along = parameter_rows.rows_along(nodes.voltages, nodes.parallel, effective)
+    return KernelInputs(nodes.rows, along, _sensors(point.effects), point.displacement_zero, nodes.voltages, effective)
+
+
+def _sensors(effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]) -> Sensors:
+    """Return those of some effects that are the sensor's, which has one value at every voltage."""
+    return {name: cast("Mapping[str, float]", own) for name, own in effects.items() if known()[name].place == "sensor"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,12 +172,15 @@ def search_directions(
         (kernel_inputs(a, o, known_inputs), kernel_inputs(b, o, known_inputs), width) for a, b, width in neighbours
     ]
     changes = [(*before.difference_to(after), width) for before, after, width in pairs]
-    moved = np.unique(np.concatenate([columns[np.any(change != 0.0, axis=0)] for columns, change, _ in changes]))
+    moves = np.zeros(here.at_nodes.shape[1], dtype=np.bool_)
+    for columns, change, _ in changes:
+        moves[columns] |= np.any(change != 0.0, axis=0)
+    moved, place = np.flatnonzero(moves), np.cumsum(moves) - 1
     along = []
     for columns, change, width in changes:
         by = np.zeros((len(change), moved.size))
-        kept = np.isin(columns, moved)
-        by[:, np.searchsorted(moved, columns[kept])] = change[:, kept] / width
+        kept = moves[columns]
+        by[:, place[columns[kept]]] = change[:, kept] / width
         along.append(here.along_motion(by))
     return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
 
