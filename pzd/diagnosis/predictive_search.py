@@ -259,7 +259,8 @@ class PredictiveSearch:
             if (found := self._fit_without(current.fitted, name)) is not None:
                 tried = self._possible(found[0], self._further(*found, thresholds.EXCHANGED_EFFECTS, (name,)))
                 tried.sort(key=lambda each: each.estimate)
-                tried[:1] = map(self._searched_on, tried[:1])
+                tried = [self._searched_on(t) if t is tried[0] or _replaces(t, name) else t for t in tried]
+                tried.sort(key=lambda each: each.estimate)
                 proposals += tried
                 if tried and tried[0].estimate < (1.0 + thresholds.LEAST_PREDICTION_GAIN) * here:
                     self.alternatives[name] = tried[0].fitted.effects[-1]
@@ -332,6 +333,11 @@ def _fewest_parameters_of_alike(better: Sequence[Tried]) -> Callable[[Tried], tu
         return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), criterion
 
     return order
+
+
+def _replaces(proposal: _Proposal, name: str) -> bool:
+    """Whether the last effect of a proposal acts at the place of another one, of which it may be the whole law."""
+    return library()[proposal.fitted.effects[-1]].place == library()[name].place == "branch"
 
 
 def _names(found: CriterionFit) -> str:

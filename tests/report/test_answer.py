@@ -46,8 +46,7 @@ def test_the_sentence_names_what_is_missing_and_how_far_the_error_falls(run: Any
         ({"verdict": "ambiguous", "effects": ()}, "These tests do not settle whether anything is missing"),
         (
             {"verdict": "ambiguous", "rivals": ("shear_thinning",)},
-            "The simple model lacks orifice quadratic or shear thinning, alone or together; these tests do not settle "
-            "which: ",
+            "The simple model lacks orifice quadratic or shear thinning, alone or together; these tests do not ",
         ),
         ({"gap": None}, "The simple model lacks turbulent flow through a sharp orifice (97"),
     ],
