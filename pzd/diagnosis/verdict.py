@@ -669,8 +669,14 @@ def knee_note(law: str, verdict: str, base: Sequence[BaseRow]) -> str:
     return "; a passive damper has bleed, knee and blow-off: identify: {law: auto} tries that law"
 
 
+SHOWS_BETWEEN = 0.05
+"""Share of the samples of tests with a moving control signal in the middle half between two levels, from which on they
+show whether the damper bends there: a step passes in a hundredth, and a node there would have nothing to be fitted to.
+"""
+
+
 def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], signal: str) -> str:
-    """Say that T0 and C are straight lines between few control signals, where some test moves between these.
+    """Say that T0 and C are straight lines between few control signals, where some test moves and stays between these.
 
     Parameters
     ----------
@@ -679,15 +685,22 @@ def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], sign
     signal : name of the control signal
     """
     levels = sorted({row.voltage_V for row in base if row.voltage_V is not None})
-    if all(each.constant for each in prepared) or len(levels) < 2:
+    moves = [v for each in prepared if not each.constant and (v := each.record.voltage) is not None]
+    if not moves or len(levels) < 2:
         return ""
     scale = max(map(abs, (*levels, levels[-1] - levels[0])))
-    wide = [pair for pair in pairwise(levels) if pair[1] - pair[0] > 4.0 * CONSTANT_SHARE * scale]
-    finer = sorted({*levels, *(0.5 * (low + high) for low, high in wide)})  # identify refuses nodes closer than half
-    return (
-        f"; between {len(levels)} levels T0, C and k are straight lines over the {signal}: "
-        f"identify: {{nodes: [{', '.join(f'{each:.4g}' for each in finer)}]}} tells whether they bend there"
-    )
+    moving = np.concatenate(moves)
+    halves = [
+        0.5 * (low + high)
+        for low, high in pairwise(levels)
+        if high - low > 4.0 * CONSTANT_SHARE * scale  # identify refuses nodes closer than half
+        and np.mean(np.abs(moving - 0.5 * (low + high)) < 0.25 * (high - low)) >= SHOWS_BETWEEN
+    ]
+    lines = f"; between {len(levels)} levels T0, C and k are straight lines over the {signal}"
+    if not halves:
+        return f"{lines}, and no test stays between them that would show whether they bend: a slow ramp does"
+    finer = sorted({*levels, *halves})
+    return f"{lines}: identify: {{nodes: [{', '.join(f'{each:.4g}' for each in finer)}]}} tells whether they bend there"
 
 
 MUCH_BY_TEMPERATURE = 0.05

@@ -194,7 +194,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
     directions = found.directions()
     of_direction = (*conditions(control, lambda each: each.row), Column("direction", "direction"))
     yield Table(
-        "Adopted law of the element",
+        "Law of the element by identify",
         (Column("setting", "setting", optional=True), Column("law", "law"), Column("reason", "reason")),
         found.laws,
     )

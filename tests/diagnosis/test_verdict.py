@@ -512,7 +512,14 @@ def test_a_friction_next_to_none_does_not_fade() -> None:
 def test_nodes_between_those_that_were_tested_are_advised_where_the_voltage_moves() -> None:
     """T0 that bends between two levels is no missing effect, and no test at a constant level shows it."""
     base = [BaseRow(voltage_V=U, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6) for U in (0.0, 50.0, 150.0)]
-    moving, constant = (cast("PreparedRecord", SimpleNamespace(constant=each)) for each in (False, True))
-    assert "identify: {nodes: [0, 25, 50, 100, 150]}" in nodes_note([constant, moving], base, "voltage")
+
+    def test(voltage: Array) -> PreparedRecord:
+        record = SimpleNamespace(voltage=voltage)
+        return cast("PreparedRecord", SimpleNamespace(constant=not np.ptp(voltage), record=record))
+
+    constant, ramp = test(np.full(100, 50.0)), test(np.linspace(0.0, 150.0, 400))
+    steps = test(np.repeat([0.0, 50.0, 150.0, 50.0], 100))
+    assert "identify: {nodes: [0, 25, 50, 100, 150]}" in nodes_note([constant, ramp], base, "voltage")
+    assert "a slow ramp does" in nodes_note([constant, steps], base, "voltage")
     assert nodes_note([constant], base, "voltage") == ""
-    assert nodes_note([moving], base[:1], "voltage") == ""
+    assert nodes_note([ramp], base[:1], "voltage") == ""

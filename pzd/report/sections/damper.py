@@ -65,8 +65,13 @@ def _intro(context: ReportContext) -> str:
 def _knee_blocks(context: ReportContext) -> Iterator[Block]:
     """Yield the tables of the knee law in the language of the trade; none where the config does not ask for it."""
     found = context.identified.knees
+    if found.law_of(context.setting) == "knee" and not context.damper.fitted_law:
+        yield Paragraph(
+            "The knee law tells this damper in the terms of the trade. The damper that is handed on stands beside one "
+            "T0 and C instead, with which kept-back tests are predicted far better."
+        )
     shown = (*tables.knee(found, context.control), tables.knee_prediction(found, context.control))
-    return (table.block() for table in shown if table.rows)
+    yield from (table.block() for table in shown if table.rows)
 
 
 def _law_refitted(context: ReportContext) -> TextTable:
