@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pzd.damper.compose import respond
+from pzd.damper.compose import respond, sensors_of
 from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
@@ -150,7 +150,7 @@ class PredictiveSearch:
             # A candidate is fitted in a few evaluations: at its optimum it may be two forces of any size that cancel.
             cancelled = new & {name for pair in cancelling(*found) for name in pair} if found and new else set()
             self.off |= cancelled
-            if cancelled:
+            if cancelled or (found is not None and _shown_early(found[1].damper)):
                 continue
             too_much = loses_between(current, tried_on, self.validation.baseline_interpolation_error)
             if found is not None and not too_much and interpolation_check(found[1].damper, self.validation):
@@ -234,7 +234,7 @@ class PredictiveSearch:
         """
 
         def proposal(each: Candidate) -> _Proposal | None:
-            if not self._moves_force(each) or each.fitted.unphysical:
+            if not self._moves_force(each) or each.fitted.unphysical or _shown_early(each.fitted.damper):
                 return None
             own = problem_for(problem, library()[each.effect])  # it may have fewer base rows
             own = replace(own, per_voltage=own.per_voltage | ({each.effect} if each.varies else set()))
@@ -333,6 +333,14 @@ def _fewest_parameters_of_alike(better: Sequence[Tried]) -> Callable[[Tried], tu
         return (float(tried.proposal.fitted.optimum.size) if alike else np.inf), criterion
 
     return order
+
+
+def _shown_early(damper: Damper) -> bool:
+    """Whether a channel would show the force before it acts: then it stands for something of the damper.
+
+    What is the sensor's is taken out of the force at the rod, and the damper would miss there what stood in it.
+    """
+    return any(value < 0.0 for values in sensors_of(damper).values() for value in values.values())
 
 
 def _replaces(proposal: _Proposal, name: str) -> bool:

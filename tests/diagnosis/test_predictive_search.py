@@ -104,6 +104,22 @@ def test_two_forces_that_cancel_at_their_optimum_are_no_step(
     assert search.off == (set() if taken else {effect})
 
 
+@pytest.mark.parametrize(("late", "taken"), [(4e-3, True), (-4e-3, False)])
+def test_a_force_that_would_be_shown_early_is_no_step(late: float, *, taken: bool, rng: np.random.Generator) -> None:
+    """It would be taken out of the force at the rod, in which it stands for something of the damper."""
+    plain = damper_of((0.0,))
+    true = plain.with_effect("sensor_delay", {"tau": late})
+    records = tuple(sine(true, 0.0, f, x, rng) for f, x in ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03)))
+    validation = cross_validation_of(campaign_of(records), plain, DiagnoseConfig().visible)
+    here, further = (validation.fit_by_criterion(damper, validation.no_samples) for damper in (plain, true))
+    assert here is not None
+    assert further is not None
+    errors = validation.error_by_criterion(plain), validation.interpolation_error(plain, by_criterion=True)
+    search = PredictiveSearch(validation, DiagnoseConfig(), most_effects=6)
+    found = search._best(CriterionFit(*here, *errors), [_Proposal.of(*further, validation)])
+    assert (found is not None) is taken
+
+
 def test_damping_along_the_stroke_predicts_kept_back_tests_though_six_evaluations_do_not_find_it(
     rng: np.random.Generator,
 ) -> None:
