@@ -76,8 +76,9 @@ def test_delays_are_looked_for_only_where_the_element_leaves_something(
     assert asked[2:] == [61, *[21] * (len(asked) - 3)]
 
 
-def explained(offsets: list[float]) -> list[str]:
-    """What the preflight says of tests with these offsets, at speeds in no order with them."""
+def explained(offsets: list[float], speeds: list[float] | None = None) -> list[str]:
+    """What the preflight says of tests with these offsets, at speeds in no order with them unless some are given."""
+    given = speeds or [0.1 * (1 + n % 3) for n in range(len(offsets))]
     entries = [
         RecordEntry(
             name=f"test {n}",
@@ -86,7 +87,7 @@ def explained(offsets: list[float]) -> list[str]:
             temperature_degC=None,
             rate_Hz=500.0,
             cycles=6.0,
-            velocity_rms_m_per_s=0.1 * (1 + n % 3),
+            velocity_rms_m_per_s=given[n],
             force_rms_N=100.0 * (1 + n % 3),
             findings=(Finding(check="offset", where="force", size=size, unit="N", follows="at first"),),
         )
@@ -100,3 +101,17 @@ def test_the_middle_of_two_groups_of_offsets_is_no_usual_one() -> None:
     assert explained([-149.8, -149.8, -149.9, -79.9, -79.9, -79.8]) == ["at first"] * 6
     told = explained([-149.8, -149.8, -149.9, -149.7, -149.8, -20.0])
     assert told[5].startswith("-149.8 N is usual in this setting: a tare that changed")
+
+
+@pytest.mark.parametrize("gas", [8000.0, -8000.0])
+def test_a_steady_force_towards_rebound_asks_which_way_is_rebound(gas: float) -> None:
+    """A gas pushes the rod out; where both signs are turned it seems to pull it in."""
+    falls = [gas * (1.0 - 0.05 * n) for n in range(6)]
+    for told in (explained([gas] * 6), explained(falls, [0.1 * (1 + n) for n in range(6)])):
+        assert all("in all 6 records of this setting, as a preload or a gas force is" in each for each in told)
+        assert all(("which way is rebound" in each) is (gas > 0.0) for each in told)
+
+
+def test_an_offset_that_comes_with_the_speed_alone_is_no_gas() -> None:
+    told = explained([20.0 * n for n in range(1, 7)], [0.1 * n for n in range(1, 7)])
+    assert all(each.startswith("it goes with the speed of the test, as where rebound is unlike") for each in told)

@@ -419,6 +419,18 @@ def test_a_range_that_a_larger_force_goes_beyond_is_the_damper_giving_way(larges
     assert sum(len(one.findings) for one in drop_contradicting_ranges(beyond)) == 0
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.8, 0), (None, 3)])
+def test_what_bends_over_alike_at_any_force_is_the_dampers(share: float | None, told: int) -> None:
+    """A power law of the speed misses the same share of every peak; an amplifier next to nothing below its limit."""
+    limit = 500.0
+
+    def missing(peak: float) -> float:
+        return share * peak if share else limit * float(np.arctanh(peak / limit)) - peak
+
+    entries = tuple(entry(f"{peak:g}", missing(peak), "range", peak) for peak in (215.0, 300.0, 480.0))
+    assert sum(len(one.findings) for one in drop_contradicting_ranges(entries)) == told
+
+
 def test_a_velocity_at_odds_with_the_displacement_is_left_out_of_everything(
     tmp_path: Path, rng: np.random.Generator
 ) -> None:

@@ -264,15 +264,19 @@ def drop_contradicting_ranges(entries: tuple[RecordEntry, ...]) -> tuple[RecordE
     free = [e.force_peak_N or 0.0 for e in entries if _missing_share(e) is None]
     largest = max((e.force_peak_N or 0.0 for e in entries), default=0.0)
 
-    def contradicted(entry: RecordEntry) -> bool:
-        peak, missing = entry.force_peak_N or 0.0, _missing_share(entry)
-        beyond = (1.0 + LEAST_CUT) * peak < max(free, default=0.0)
-        return missing is not None and (beyond or (1.0 + LEAST_CUT) * _soft_limit(missing) * peak < largest)
+    def bends_below(entry: RecordEntry) -> bool:
+        """Whether it bends over below a limit that another record goes beyond."""
+        missing = _missing_share(entry)
+        return missing is not None and (1.0 + LEAST_CUT) * _soft_limit(missing) * (entry.force_peak_N or 0.0) < largest
 
-    bends = max((_missing_share(e) or 0.0 for e in entries if contradicted(e)), default=0.0)
+    def goes_beyond(entry: RecordEntry) -> bool:
+        """Whether a record without an end of its range has a larger force."""
+        return (1.0 + LEAST_CUT) * (entry.force_peak_N or 0.0) < max(free, default=0.0)
+
+    alike = AS_MUCH * max((_missing_share(e) or 0.0 for e in entries if bends_below(e)), default=0.0)
     return tuple(
         entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "range")})
-        if contradicted(entry) or (_missing_share(entry) or np.inf) <= AS_MUCH * bends
+        if goes_beyond(entry) or (_missing_share(entry) or np.inf) <= alike
         else entry
         for entry in entries
     )
