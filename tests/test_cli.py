@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import shutil
@@ -1119,6 +1120,23 @@ def test_progress_is_a_bar_on_a_terminal_and_a_line_where_all_is_wanted(
 ) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     Output(**({"quiet": False, "verbose": False} | flags)).progress(Progress(1, 4, "conditions: ok"))
+    assert capsys.readouterr() == (out, err)
+
+
+@pytest.mark.parametrize(
+    ("flags", "out", "err"),
+    [
+        ({}, "", "\r\x1b[Kdiagnose: step"),
+        ({"verbose": True}, "  diagnose: step\n", "\r\x1b[K"),
+        ({"quiet": True}, "", ""),
+    ],
+)
+def test_what_a_stage_says_of_its_work_is_seen_in_passing_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, flags: dict[str, bool], out: str, err: str
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    Output(**({"quiet": False, "verbose": False} | flags))
+    logging.getLogger("pzd.diagnosis").info("diagnose: step")
     assert capsys.readouterr() == (out, err)
 
 

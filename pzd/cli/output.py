@@ -72,17 +72,23 @@ class _Handler(logging.Handler):
         self.output = output
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show one message."""
+        """Show one message: a remark in passing on a terminal, where no more is wanted."""
         if record.levelno >= logging.WARNING:
             complain([record.getMessage()])
         elif self.output.verbose:
             self.output.say(f"  {record.getMessage()}")
+        elif not self.output.quiet and sys.stderr.isatty():
+            _show_in_passing(record.getMessage())
 
 
 def _draw(event: Progress) -> None:
     filled = _BAR * event.done // max(event.whole, 1)
-    line = harmless(f"[{'#' * filled}{'.' * (_BAR - filled)}] {event}")
-    sys.stderr.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
+    _show_in_passing(f"[{'#' * filled}{'.' * (_BAR - filled)}] {event}")
+
+
+def _show_in_passing(text: str) -> None:
+    """Show a text in the last line of the terminal until something else is said."""
+    sys.stderr.write(f"\r\x1b[K{harmless(text)[: shutil.get_terminal_size().columns - 1]}")
     sys.stderr.flush()
 
 

@@ -95,6 +95,7 @@ class PredictiveSearch:
     def improve(self, current: CriterionFit) -> CriterionFit:
         """Add and exchange effects until nothing improves the prediction or the budget is spent."""
         while self.validation.campaign.budget.allows_more():
+            log.info("diagnose: looks for what predicts kept-back tests, beside %s", _names(current) or "no effect")
             self.losing.clear()
             best = (self._best(current, proposals) for proposals in self._neighbours(current))
             better = next((found for found in best if found is not None), None)

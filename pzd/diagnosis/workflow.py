@@ -228,6 +228,7 @@ def _searched(
             next_test=_next_test(adoption, decision, final, zero, validation, recorded, envelope),
         )
         fitted = base_parameters(handed_on, decision.verdict, setting) if selection.adopted else rows
+        log.info("diagnose: looks for the shape of what is left")
         shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
         # The gas of the law counts from the same zero in both, where it has a force besides its stiffness.
         plain = identified.about(zero) if selection.adopted else identified

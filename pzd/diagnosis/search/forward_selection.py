@@ -252,6 +252,9 @@ class _ForwardSelection:
 
     def step(self) -> bool:
         """Adopt one more effect, an adopted one per voltage, or a supported pair; return whether any was."""
+        log.info(
+            "diagnose: looks for an effect beside %s", " and ".join(self.current.effects) or "the law of the element"
+        )
         tried = self._candidates(self.evidence, self.current)
         if self._descends_from(tried):
             tried = self._candidates(self.evidence, self.current)
