@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from typing_extensions import override
@@ -12,7 +13,7 @@ from typing_extensions import override
 from pzd.artefacts import Diagnosed, ForceRow, Table
 from pzd.damper.model import BaseRow
 from pzd.damper.model import Damper as Model
-from pzd.front.arguments import control_of, in_python, label, numbers
+from pzd.front.arguments import Given, control_of, in_python, label, numbers
 from pzd.front.pipelines import config_of, pipeline_of
 from pzd.front.results import Result, frame_of, new_axes
 from pzd.quantities import BINGHAM, FORCE, VELOCITY, Control
@@ -36,6 +37,19 @@ _BEYOND_NOISE = 20.0
 """Standard deviations of its noise by which cleaning may move a sample of a displacement.
 
 Reason: five were seen at most on measured motions, ten where a clock jitters; a step has hundreds."""
+
+
+def named_by_control(function: Callable[Given, Array]) -> Callable[Given, Array]:
+    """Let a method of a damper take the control signal by its own name as well: `force(t, x, current=0.5)`."""
+
+    @wraps(function)
+    def called(*args: Given.args, **kwargs: Given.kwargs) -> Array:
+        own = cast("Damper", args[0]).control.name
+        if own in kwargs and "voltage" not in kwargs:
+            kwargs["voltage"] = kwargs.pop(own)
+        return function(*args, **kwargs)
+
+    return called
 
 
 class Damper(Result):
@@ -149,6 +163,7 @@ class Damper(Result):
         return tuple(sorted({row.temperature_degC for row in self.model.base if row.temperature_degC is not None}))
 
     @in_python
+    @named_by_control
     def force(
         self,
         time: Any,
@@ -165,7 +180,8 @@ class Damper(Result):
         ----------
         time : (n,) strictly increasing [s]
         displacement : (n,) extension [m]
-        voltage : control signal, a number or (n,); may be left out where the damper was identified at a single one
+        voltage : control signal, a number or (n,), by its own name too (`current=0.5`); may be left out where the
+            damper was identified at a single one
         temperature : a number or (n,) [degC]; by default the lowest at which the damper is known
         velocity : (n,) rate of extension [m/s]; without it the displacement is taken as measured: it is cleaned of its
             noise, where that leaves no step or corner out, and the rate comes of it, as for a record
@@ -217,6 +233,7 @@ class Damper(Result):
         return Motion(t, kept, clean.velocity, clean.acceleration, *channels)
 
     @in_python
+    @named_by_control
     def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:
         """Compute the force at steady velocities, as the table of force holds it.
 
@@ -225,7 +242,7 @@ class Damper(Result):
         Parameters
         ----------
         velocity : (n,) rate of extension [m/s]
-        voltage : control signal, a number or (n,)
+        voltage : control signal, a number or (n,), by its own name too
         temperature : [degC]; by default the lowest at which the damper is known
 
         Returns
@@ -341,6 +358,7 @@ class CurveDamper(Damper):
 
     @override
     @in_python
+    @named_by_control
     def curve(self, velocity: Any, voltage: Any = None, temperature: float | None = None) -> Array:
         v = numbers("velocity", velocity)
         u = self._label("voltage", voltage, v.size)

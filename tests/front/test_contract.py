@@ -325,6 +325,15 @@ def test_the_curve_is_the_law_and_the_force_of_a_slow_motion_follows_it(hidden: 
     assert force[-1] == pytest.approx(expected[2], rel=1e-6)
 
 
+def test_the_control_signal_may_be_given_by_its_own_name(hidden: pzd.Damper) -> None:
+    time, by_name = np.arange(400) / 1000.0, {hidden.control.name: 1.5}
+    assert hidden.control.name == "current"
+    np.testing.assert_array_equal(hidden.force(time, 0.1 * time, **by_name), hidden.force(time, 0.1 * time, 1.5))
+    np.testing.assert_array_equal(hidden.curve([0.1, -0.2], **by_name), hidden.curve([0.1, -0.2], 1.5))
+    with pytest.raises(TypeError, match="pressure"):
+        hidden.force(time, 0.1 * time, pressure=1.5)  # type: ignore[call-arg]  # as a user mistypes it
+
+
 @pytest.mark.parametrize("stiffness", [2e5, 2e6, 2e7])
 def test_the_noise_of_a_displacement_is_no_motion_of_a_stiff_oil_spring(
     stiffness: float, rng: np.random.Generator
