@@ -28,7 +28,7 @@ from pzd.damper.effects import library
 from pzd.damper.element import element_force
 
 ROOT = Path(__file__).resolve().parent.parent
-BLIND = "pzd blind configs/blind.yaml --set blind.cases=12 --set blind.seed=1 --set blind.tuning=true"
+BLIND = "pzd blind configs/blind.yaml --set blind.cases=6 --set blind.seed=1 --set blind.tuning=true"
 LONG = ("make demo", ". .venv/bin/activate", BLIND)
 """Commands of the README that install or take minutes: `make ci` alone runs them."""
 SMALL: dict[str, Any] = {
