@@ -66,7 +66,13 @@ CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERAT
 first five are in every file."""
 
 
-_VOLTAGE_ALONE = re.compile(rf"\b{VOLTAGE.name}(?=s?\b)")  # and not as a part of the name of a policy or a column
+_VOLTAGE_ALONE = re.compile(rf"(?<![\w.-])(?i:{VOLTAGE.name})(?=s?\b(?!-|\.\w))")
+"""As a word, and not as a part of the name of a policy, a column or a file."""
+
+
+def _as_begun(said: str, name: str) -> str:
+    """Return a name with a capital where another word has one."""
+    return name.capitalize() if said[0].isupper() else name
 
 
 @dataclass(frozen=True)
@@ -94,8 +100,11 @@ class Control:
         --------
         >>> Control("current", "A").told("less than at the best fixed voltage (best_fixed_voltage)")
         'less than at the best fixed current (best_fixed_voltage)'
+        >>> Control("current", "A").told("Voltage 2 A of voltage-step.csv and voltage.csv. The voltages:")
+        'Current 2 A of voltage-step.csv and voltage.csv. The currents:'
         """
-        return text if self == Control() else _VOLTAGE_ALONE.sub(self.name.replace("_", " "), text)
+        name = self.name.replace("_", " ")
+        return text if self == Control() else _VOLTAGE_ALONE.sub(lambda said: _as_begun(said[0], name), text)
 
     def renamed(self, column: str) -> str:
         """Return the name of a canonical column under this control: voltage_1_V -> current_1_A."""

@@ -793,6 +793,15 @@ def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     assert diagnosis_lines(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
 
 
+@pytest.mark.parametrize(("third", "told"), [(100.0, True), (None, False), (50.0, False)])
+def test_between_two_levels_a_line_is_taken_unless_something_shows_it(third: float | None, told: bool) -> None:
+    levels = (0.0, 100.0, third)
+    by = tuple(HeldOutTest(record=f"r{n}", voltage=u, W_s_plain=0.01, W_s=0.01) for n, u in enumerate(levels))
+    kept_back = Prediction(hold_out="tests", by=by, W_s_plain=0.01, W_s=0.01, left_out_voltages=())
+    lines = diagnosis_lines(diagnosis().model_copy(update={"prediction": kept_back}), Control())
+    assert any("no third level was tested" in line for line in lines) is told
+
+
 def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
     assert diagnosis_lines(diagnosis(), Control()) == [
         "verdict: named, one answer fits, and no other does",

@@ -274,19 +274,34 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     """Return the damper of one setting by the knee law: a base row a condition, knee, seal and gas as effects.
 
     Gas force and gas spring are left out where the fit of every condition went without them. Effects know no
-    temperature: where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
+    temperature: where a voltage was tested at several, theirs are the mean, and so is the friction of a seal; T0, C and
+    k are of each.
 
     Parameters
     ----------
     rows : of one setting, at least one
     """
+    from pzd.damper.parameter_rows import rows_per_voltage  # here, since it needs numba
+
     displacement_zero = float(np.mean([row.zero_m for row in rows]))
 
     def gas_force(row: KneeRow) -> float:
         return row.gas_force_N + row.gas_spring_N_per_m * (displacement_zero - row.zero_m)
 
-    voltages = sorted({row.voltage_V for row in rows}, key=lambda v: -np.inf if v is None else v)
-    parts = [[row for row in rows if row.voltage_V == voltage] for voltage in voltages]
+    base = tuple(
+        BaseRow(
+            voltage_V=row.voltage_V,
+            temperature_degC=row.temperature_degC,
+            T0_N=row.friction_of_flow,
+            C_Ns_per_m=mean_bleed(row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m),
+            k_N_per_m=row.k_N_per_m,
+        )
+        for row in rows
+    )
+    # Labels of one level at two temperatures may differ a little.
+    of_base = {id(each): row for each, row in zip(base, rows, strict=True)}
+    groups = rows_per_voltage(base)
+    parts = [[of_base[id(each)] for each in group] for _, group in groups]
     effects = {
         "seal": [_mean([_seal(row) for row in part]) for part in parts],
         "knee": [_mean([_knee(row) for row in part]) for part in parts],
@@ -299,18 +314,9 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
         "preload_offset": any(row.gas_force_N != 0.0 for row in rows),
         "gas_spring": any(row.gas_spring_N_per_m != 0.0 for row in rows),
     }
-    given = [voltage for voltage in voltages if voltage is not None]
+    given = [voltage for voltage, group in groups if group[0].voltage_V is not None]
     return Damper(
-        base=tuple(
-            BaseRow(
-                voltage_V=row.voltage_V,
-                temperature_degC=row.temperature_degC,
-                T0_N=row.friction_of_flow,
-                C_Ns_per_m=mean_bleed(row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m),
-                k_N_per_m=row.k_N_per_m,
-            )
-            for row in rows
-        ),
+        base=base,
         effects={name: _per_voltage(values, given) for name, values in effects.items() if shown[name]},
         zero_m=displacement_zero,
     )

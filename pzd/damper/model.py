@@ -120,7 +120,9 @@ class Damper(Frozen):
         if not moved.any():
             return self.model_copy(update={"zero_m": zero})
         force = np.add(preload.get("F_0", 0.0), moved)
-        values = {"F_0": tuple(force.tolist()), NODE_VOLTAGES: nodes.pop()} if nodes else {"F_0": float(force)}
+        values: EffectValues = {"F_0": float(force)} if not nodes else {}
+        for own in nodes:  # one value at every node stands for each
+            values = {"F_0": tuple(np.broadcast_to(force, np.shape(own)).tolist()), NODE_VOLTAGES: own}
         return self.model_copy(update={"effects": {**self.effects, "preload_offset": values}, "zero_m": zero})
 
 

@@ -6,7 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from pzd.damper.effect import ELEMENT
 from pzd.damper.effects import library
-from pzd.damper.fitted_laws import fitted_laws
+from pzd.damper.fitted_laws import knee
 from pzd.schema.model import Frozen, nearest
 from pzd.signals.measures import SIGNIFICANCE, VISIBLE
 from pzd.signals.nuisance import NuisanceConfig
@@ -46,7 +46,7 @@ class ChangesConfig(Frozen):
     @field_validator("tolerance")
     @classmethod
     def _known_quantities(cls, tolerance: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        effects = [*library().values(), *fitted_laws().values()]
+        effects = [*library().values(), knee.EFFECT]  # the friction of a seal is T0
         known = {*ELEMENT, *(f"{e.name}.{p.name}" for e in effects for p in e.parameters)}
         for name, limits in tolerance.items():
             if name not in known:

@@ -169,6 +169,8 @@ def repeated_longest_test(
     """
     for each in sorted(recorded, key=lambda p: -float(np.ptp(p.record.time))):
         amplitude = min(0.5 * float(np.ptp(each.record.displacement)), envelope.amplitude)
+        if amplitude < SMALLEST_AMPLITUDE * envelope.amplitude:
+            continue
         frequency = rounded_down(min(envelope.frequency, envelope.speed / (2.0 * np.pi * amplitude)))
         voltage = each.record.median_voltage()
         stepped = bool(moving) and len(envelope.voltages) > 1

@@ -240,11 +240,10 @@ def _gap_change(
     config : thresholds
     """
     if sizes[0] >= config.negligible:
-        course = "falls" if sizes[1] < sizes[0] else "does not fall, but goes"
-        change = f"the gap {course} from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+        change = f"the gap {_course(sizes)} of peak"
         if whole[0] <= MOSTLY_NUISANCES * sizes[0]:
             return change
-        error = f"the error falls from {_percent(whole[0])} to {_percent(whole[1])} of peak"
+        error = f"the error {_course(whole)} of peak"
         return f"{error}; {change} beside what a zero, gain and delay of each test would explain"
     # Evidence begun from another damper may simulate other parts of a record.
     final, fits = selection.final_evidence.whole, (selection.baseline, selection.fitted)
@@ -254,6 +253,12 @@ def _gap_change(
         f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "
         f"though the gap as a whole ({_percent(sizes[0])} of peak above the noise) does not stand out of it"
     )
+
+
+def _course(sizes: tuple[float, float]) -> str:
+    """Say how a size went from before to after."""
+    course = "falls" if sizes[1] < sizes[0] else "does not fall, but goes"
+    return f"{course} from {_percent(sizes[0])} to {_percent(sizes[1])}"
 
 
 def leaves_too_much(sizes: tuple[float, float], chance: float, config: DiagnoseConfig) -> bool:
@@ -690,11 +695,14 @@ def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], sign
         return ""
     scale = max(map(abs, (*levels, levels[-1] - levels[0])))
     moving = np.concatenate(moves)
+    # identify refuses nodes closer than half
+    wide = [(low, high) for low, high in pairwise(levels) if high - low > 4.0 * CONSTANT_SHARE * scale]
+    if not wide:
+        return ""
     halves = [
         0.5 * (low + high)
-        for low, high in pairwise(levels)
-        if high - low > 4.0 * CONSTANT_SHARE * scale  # identify refuses nodes closer than half
-        and np.mean(np.abs(moving - 0.5 * (low + high)) < 0.25 * (high - low)) >= SHOWS_BETWEEN
+        for low, high in wide
+        if np.mean(np.abs(moving - 0.5 * (low + high)) < 0.25 * (high - low)) >= SHOWS_BETWEEN
     ]
     lines = f"; between {len(levels)} levels T0, C and k are straight lines over the {signal}"
     if not halves:

@@ -282,7 +282,8 @@ def effect_rows(content: Content) -> tuple[EffectRow, ...]:
     for name, given in content.damper.effects.items():
         nodes = given.get(NODE_VOLTAGES)
         for parameter in known()[name].parameters:
-            value, unit = given[parameter.name], content.control.own_unit(parameter.unit)
+            value = given.get(parameter.name, parameter.neutral)
+            unit = content.control.own_unit(parameter.unit)
             values = value if isinstance(value, tuple) else (value,)
             voltages = nodes if isinstance(value, tuple) and isinstance(nodes, tuple) else (None,)
             rows += [

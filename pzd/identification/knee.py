@@ -69,7 +69,7 @@ def identify_knees(
     settings : of the rig
     config : the law asked for, and standard deviations of what differs from test to test
     control : the control signal, which may be a clicker
-    progress : called after every condition
+    progress : called with every condition of a setting, when all of them are fitted
 
     Raises
     ------

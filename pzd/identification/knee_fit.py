@@ -513,7 +513,9 @@ def fit_knees(conditions: Sequence[tuple[KneeData, float]]) -> list[KneeFit]:
     of_flow = [_with_every_part(tests, stiffness) for tests, stiffness in short]
     on_rod = [_on_the_rod(tests, fit) for (tests, _), fit in zip(short, of_flow, strict=True)]
     left = [sum(fit.criterion for fit in fits) for fits in (of_flow, on_rod)]
-    whole = on_rod if left[1] < (1.0 - SHOWN_OF_LEFT) * left[0] else of_flow
+    whole = of_flow
+    if left[1] < (1.0 - SHOWN_OF_LEFT) * left[0]:
+        whole, simple = on_rod, [_on_the_rod(tests, fit) for (tests, _), fit in zip(short, simple, strict=True)]
     every = zip(short, simple, whole, strict=True)
     chosen = [_that_predicts(tests, *(_with_what_shows(tests, fit) for fit in pair)) for (tests, _), *pair in every]
     return [descend(tests, fit.form, fit.curve, fit.gas) for (tests, _), fit in zip(conditions, chosen, strict=True)]
@@ -686,7 +688,8 @@ def _search_bounds(tests: KneeData, form: KneeForm, start: KneeCurve) -> tuple[A
     for direction in form.directions_with_knee:
         knee = [NEAREST_KNEE * fastest, fastest]
         if form.has_round_knee[direction]:
-            knee = [min(max(start.knee_speed[direction] * factor, knee[0]), knee[1]) for factor in ROUND_KNEE_RANGE]
+            begins = min(max(start.knee_speed[direction], knee[0]), knee[1])  # it may lie beyond these tests
+            knee = [max(ROUND_KNEE_RANGE[0] * begins, knee[0]), min(ROUND_KNEE_RANGE[1] * begins, knee[1])]
         pairs += [knee, slope]
     pairs += [[each / fastest for each in slope]] * len(form.directions_with_square)
     pairs += [[share * tests.peak for share in SPREAD_RANGE]] * len(form.directions_with_round_knee)

@@ -182,7 +182,7 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
     for left in listed if every_test else listed[:1]:
         yield f"left out: {shown(left.voltage, unit)}, predicted from its neighbours with {errors(left)}"
     levels = sorted({test.voltage for test in found.by if test.voltage is not None})
-    if len(levels) == 2:
+    if len(levels) == 2 and all(test.voltage is not None for test in found.by):
         low, high = (shown(level) for level in levels)
         yield f"between {low} and {high} {unit}: taken on a line, for no third level was tested that would show it"
 

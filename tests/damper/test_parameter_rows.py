@@ -85,6 +85,13 @@ def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
         assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
 
 
+def test_a_gas_spring_of_one_value_at_every_node_counts_from_another_place_too() -> None:
+    rows = tuple(BaseRow(voltage_V=u, T0_N=1.0, C_Ns_per_m=1.0, k_N_per_m=1e6) for u in (0.0, 1.0))
+    damper = Damper(base=rows, effects={"gas_spring": {"k_g": 1000.0, "at_voltage_V": (0.0, 1.0)}})
+    moved = damper.about(0.01)
+    assert moved.effects["preload_offset"] == {"F_0": (10.0, 10.0), "at_voltage_V": (0.0, 1.0)}
+
+
 def test_an_uneven_time_gives_the_same_force(rng: np.random.Generator) -> None:
     uneven = np.sort(rng.uniform(0, 1, 3000))
     omega = 2 * np.pi * 2

@@ -301,6 +301,15 @@ def test_one_more_test_is_another_than_was_run(rng: np.random.Generator) -> None
     assert len({*asked}) == len(asked) == len(THREE) * len(tests)
 
 
+def test_a_test_at_rest_is_no_stroke_to_repeat(rng: np.random.Generator) -> None:
+    records = sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4)
+    rest = replace(records[0], name="rest", time=20.0 * records[0].time, displacement=1e-4 * records[0].displacement)
+    tests = prepare((rest, *records))
+    plan = repeated_longest_test(tests, operating_envelope(LIMITS, tests, THREE))
+    assert plan is not None
+    assert plan.amplitude_m == pytest.approx(0.02, rel=0.1)
+
+
 def test_a_lag_beside_a_hysteresis_asks_for_a_control_signal_that_steps(rng: np.random.Generator) -> None:
     records = prepare(sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4))
     envelope, names = operating_envelope(LIMITS, records, THREE), ("valve_lag", "piezo_hysteresis")

@@ -522,4 +522,6 @@ def test_nodes_between_those_that_were_tested_are_advised_where_the_voltage_move
     assert "identify: {nodes: [0, 25, 50, 100, 150]}" in nodes_note([constant, ramp], base, "voltage")
     assert "a slow ramp does" in nodes_note([constant, steps], base, "voltage")
     assert nodes_note([constant], base, "voltage") == ""
+    near = [row.model_copy(update={"voltage_V": U}) for row, U in zip(base, (148.0, 149.0, 150.0), strict=True)]
+    assert nodes_note([ramp], near, "voltage") == ""
     assert nodes_note([ramp], base[:1], "voltage") == ""

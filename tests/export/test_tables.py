@@ -14,7 +14,8 @@ from exported_dampers import DAMPERS, content_of
 from scipy.io import loadmat
 
 from pzd.artefacts import ForceRow
-from pzd.export.content import Content
+from pzd.damper.model import BaseRow, Damper
+from pzd.export.content import Content, effect_rows
 from pzd.export.formats import formats
 from pzd.quantities import Control
 
@@ -22,6 +23,16 @@ from pzd.quantities import Control
 def numbers(content: Content, field: str) -> np.ndarray:
     """A field of the run's table of force, NaN where a cell is empty."""
     return np.array([getattr(row, field) for row in content.table.force], dtype=float)
+
+
+def test_a_part_of_the_law_that_a_file_leaves_out_is_written_as_absent() -> None:
+    """As of a damper that was written before knees could be round."""
+    base = (BaseRow(T0_N=10.0, C_Ns_per_m=2000.0, k_N_per_m=1e6),)
+    law = {"beta": 0.0, "F_reb": 500.0, "C_reb": 500.0, "F_comp": 400.0, "C_comp": 400.0}
+    rows = effect_rows(content_of(Damper(base=base, effects={"knee": law})))
+    assert {row.parameter: row.value for row in rows} == law | dict.fromkeys(
+        ("q_reb", "q_comp", "s_reb", "s_comp"), 0.0
+    )
 
 
 @pytest.mark.parametrize(

@@ -289,6 +289,26 @@ def test_spread_of_the_knees_and_friction_on_the_rod_are_found_where_they_are(rn
     assert damper.effects["knee"]["F_reb"] == pytest.approx(300.0, rel=0.05)  # of the oil alone
 
 
+def test_a_round_knee_beyond_the_tests_that_are_left_without_the_fastest_is_still_fitted(
+    rng: np.random.Generator,
+) -> None:
+    """To predict the one fast test the others, none of which reaches the knee, are fitted alone."""
+    base = TRUTH.base[0].model_copy(update={"T0_N": 10.0, "k_N_per_m": 4e6})
+    law = {
+        "beta": 0.25,
+        "F_reb": 500.0,
+        "C_reb": 500.0,
+        "F_comp": 385.0,
+        "C_comp": 400.0,
+        "s_reb": 60.0,
+        "s_comp": 40.0,
+    }
+    truth = Damper(base=(base,), effects={"knee": law})
+    tests = [(2.0, speed / (4.0 * np.pi)) for speed in (0.02, 0.05, 0.08, 0.6)]
+    here = identify(IdentifyConfig(law="auto"), rig(of(truth), rng, 0.001, tests), 1)
+    assert here.knees.law_of(None) == "knee"
+
+
 def test_a_friction_behind_the_oil_spring_is_not_put_on_the_rod(with_a_knee: Identified) -> None:
     (row,) = with_a_knee.knees.rows
     assert row.seal_m_per_s is None
@@ -449,6 +469,13 @@ def test_the_damper_of_several_conditions_has_the_law_of_each_at_its_voltage_and
     assert at[2] == pytest.approx(3.0 * at[0])
     assert at[1] == pytest.approx(2.0 * at[0], rel=1e-6)
     assert float(steady_force(damper, 0.0, None, -0.3)) == pytest.approx(-50.0 - 500.0 * 0.3)
+
+
+def test_one_level_at_two_temperatures_is_one_node_though_its_labels_differ_a_little() -> None:
+    labels = ((0.0, 20.0), (0.0, 60.0), (1.998, 20.0), (2.003, 60.0))
+    damper = knee_damper([knee_row(voltage, temperature=warm) for voltage, warm in labels])
+    assert {values["at_voltage_V"] for values in damper.effects.values()} == {(0.0, 1.998)}
+    assert len(damper.base) == 4
 
 
 def test_a_gas_that_no_condition_shows_is_no_effect_of_the_damper() -> None:

@@ -162,7 +162,7 @@ class FirstState:
             if c.of == "stand" or c.parameter == SHARE:
                 continue
             if c.name == "T0" and {seal.EFFECT.name, knee.EFFECT.name} <= {*effects}:
-                self._move_seal(effects[seal.EFFECT.name], c, x)
+                self._move_frictions(effects[seal.EFFECT.name], rows, c, x)
             elif c.name in ELEMENT_COLUMNS or c.name == "temperature":
                 of_node = range(len(groups)) if c.node is None else (c.node,)
                 for original in (row for i in of_node for row in groups[i][1]):
@@ -205,15 +205,25 @@ class FirstState:
             return row.model_copy(update={column: value * float(np.exp(x))})
         return row.model_copy(update={column: max(value + x * self._friction_unit(value, c.node), 0.0)})
 
-    def _move_seal(self, own: dict[str, float | tuple[float, ...]], c: Coordinate, x: float) -> None:
-        """Change the friction where it is that of a seal, at one control signal or at all."""
+    def _move_frictions(
+        self, own: dict[str, float | tuple[float, ...]], rows: dict[int, BaseRow], c: Coordinate, x: float
+    ) -> None:
+        """Change the friction of a seal and what the flow has beside it alike, at one control signal or at all."""
 
-        def moved(friction: float) -> float:
-            return max(friction + x * self._friction_unit(friction, c.node), 0.0)
+        def factor(friction: float) -> float:
+            return max(1.0 + x * self._friction_unit(friction, c.node) / friction, 0.0) if friction > 0.0 else 1.0
 
-        given = own["F_s"]
-        at = (moved(f) if c.node in (None, i) else f for i, f in enumerate(np.atleast_1d(given).tolist()))
-        own["F_s"] = tuple(at) if isinstance(given, tuple) else next(at)
+        given, moved = own["F_s"], []
+        rubs = np.atleast_1d(given).tolist()
+        for i, (_, group) in enumerate(rows_per_voltage(self.damper.base)):
+            mine = rubs[min(i, len(rubs) - 1)]
+            for original in group if c.node in (None, i) else ():
+                row = rows[id(original)]
+                rows[id(original)] = row.model_copy(update={"T0_N": row.T0_N * factor(row.T0_N + mine)})
+            whole = mine + float(np.mean([row.T0_N for row in group]))
+            changed = mine * factor(whole) if whole > 0.0 else max(x * self._friction_unit(0.0, c.node), 0.0)
+            moved.append(changed if c.node in (None, i) else mine)
+        own["F_s"] = tuple(moved) if isinstance(given, tuple) else moved[c.node or 0]
 
     def _friction_unit(self, friction: float, node: int | None) -> float:
         """Return by how much a T0 [N] changes by one unit of its coordinate, of one control signal or of all [N]."""

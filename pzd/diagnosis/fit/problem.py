@@ -256,7 +256,7 @@ class Problem:
     ) -> tuple[Mapping[str, Mapping[str, float | tuple[float, ...]]], float]:
         """Return the values by effect and parameter, and the zero of the displacement [m], at a point of the search."""
         effects: dict[str, dict[str, float | tuple[float, ...]]] = {
-            name: {p.name: values[p.name] for p in known()[name].parameters if not _is_free(values, p)}
+            name: {p.name: values.get(p.name, p.neutral) for p in known()[name].parameters if not _is_free(values, p)}
             for name, values in self.law.items()
         }
         zero = 0.0

@@ -23,8 +23,9 @@ from states import (
     state_of,
 )
 
+from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.changes.candidates import candidates
+from pzd.diagnosis.changes.candidates import Coordinate, FirstState, candidates, element_of
 from pzd.diagnosis.changes.compared_tests import ModelError, comparisons_of
 from pzd.diagnosis.changes.comparison import Findings, changes_between, findings_between
 from pzd.diagnosis.changes.regression import Fitted
@@ -48,6 +49,21 @@ def findings(rng: np.random.Generator, before: Damper, after: Damper, scatter: f
 def through_first_state(found: Findings, fitted: Fitted) -> Array:
     columns = found.search.regression.columns(fitted.coordinates, fitted.values)
     return Uncertainty(found.search, fitted).through_first_state(columns)
+
+
+@pytest.mark.parametrize("node", [None, 1])
+def test_what_a_seal_rubs_and_what_the_flow_has_beside_it_move_alike(node: int | None) -> None:
+    """A seal that one level shows and another does not: what is left of it there is T0."""
+    rows = (BaseRow(voltage_V=u, T0_N=t, C_Ns_per_m=2000.0, k_N_per_m=1e6) for u, t in ((0.0, 0.0), (1.0, 20.0)))
+    knee = {"beta": 0.0, "F_reb": 500.0, "C_reb": 500.0, "F_comp": 500.0, "C_comp": 500.0}
+    damper = Damper(base=tuple(rows), effects={"knee": knee})
+    damper = damper.with_effect("seal", {"F_s": (30.0, 10.0), "v_s": (1e-3, 1e-3), "at_voltage_V": (0.0, 1.0)})
+    first = FirstState(damper, 1500.0, cast("Scales", None), 0.0)
+    friction = Coordinate("T0", "T0", "damper", "N", 1.0, node)
+    for x in (-1.0, -0.5, 0.2):
+        changed = first.changed([friction], [x], None)
+        rubs = [float(element_of(changed, voltage, None)[0]) for voltage in (0.0, 1.0)]
+        assert rubs == pytest.approx([30.0 * (1.0 + x if node is None else 1.0), 30.0 * (1.0 + x)])
 
 
 def test_an_exponent_of_the_viscous_force_is_as_open_as_the_damping_itself(rng: np.random.Generator) -> None:

@@ -38,6 +38,11 @@ def test_friction_that_rises_leaves_its_limits_and_what_changed_in_no_state_stay
     assert followed(T0=(0.0, 2.0 * friction), gas_spring__k_g=(0.0, 1.0)).pass_ is None
 
 
+def test_limits_of_the_friction_of_a_seal_are_those_of_t0() -> None:
+    with pytest.raises(ValueError, match=r"no quantity is called seal\.F_s"):
+        ChangesConfig(tolerance={"seal.F_s": (10.0, 20.0)})
+
+
 def test_the_force_that_fades_in_a_long_test_is_followed_over_its_cycles(rng: np.random.Generator) -> None:
     damper = drawn_damper(rng, voltages=(0.0,))
     count, lost = 16, 0.15
