@@ -6,9 +6,9 @@ the joint bears too, F_m = -F_0. There the rod goes on as the gas drives it, at 
 play is passed. F_m is searched freely; that it comes out as the force of the gas is what speaks for a joint. A gas that
 hardens moves it along the stroke, which the law leaves out: where it does so by a quarter of F_m little is gained.
 Range: 0.1-1 mm, and oil springs softer than 100 |F_m|/delta: behind a stiffer one, where so steep a law would not be
-integrated, it is `lash`. Its nearest neighbour is `lash`, play between the oil spring and the flow, which is passed at F = 0,
-the same where there is no gas; the loop distinguishes them: a joint has its shelf at no force at all, free play before
-the oil at the force of the gas.
+integrated, it is `lash`. That is its nearest neighbour, play between the oil spring and the flow, passed at F = 0, the
+same where there is no gas; the loop distinguishes them: a joint has its shelf at no force at all, free play before the
+oil at the force of the gas.
 """
 
 from __future__ import annotations
