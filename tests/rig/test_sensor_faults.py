@@ -18,7 +18,7 @@ from pzd.record import Array, Record, conditions, distinct
 from pzd.rig.config import Limits
 from pzd.rig.preflight import Check, PreflightRecord, findings
 from pzd.rig.preflight.amplifier import amplifier, drop_contradicting_filters, drop_contradicting_ranges
-from pzd.rig.preflight.force import delay
+from pzd.rig.preflight.force import delay, offset
 from pzd.rig.preflight.sensors import drift, dropouts, fade, gain_step, held_channel, quantisation
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -234,6 +234,21 @@ def test_a_force_that_follows_its_control_signal_neither_steps_nor_fades(course:
         moving = replace(record, force=record.force * (1.0 + share), voltage=100.0 * share)
         assert sizes([moving], gain_step) == sizes([moving], fade) == []
         assert sizes([replace(moving, voltage=None)], gain_step) or sizes([replace(moving, voltage=None)], fade)
+
+
+def test_what_the_control_signal_makes_of_the_mean_force_is_neither_a_drift_nor_a_tare(
+    rng: np.random.Generator,
+) -> None:
+    """A damper that is stiffer one way, and whose control signal rises: its mean goes with the signal."""
+    told = []
+    for one in rng.spawn(DRAWS):
+        record = drawn(one).recorded(one)
+        share = record.time / record.time[-1]
+        sided = np.where(record.force > 0.0, 1.0 + share, 1.0) * record.force
+        moving = replace(record, force=sided, voltage=100.0 * share)
+        assert sizes([moving], drift) == sizes([moving], offset) == []
+        told += sizes([replace(moving, voltage=None)], drift)
+    assert len(told) > 0.5 * DRAWS
 
 
 @pytest.mark.parametrize("told_at", [5, 8])

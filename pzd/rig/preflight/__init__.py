@@ -10,7 +10,7 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import import_module
 from types import ModuleType
 
@@ -20,7 +20,7 @@ from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig
 from pzd.parallel.on_disk import OnDisk
 from pzd.parallel.processes import parallel_each
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
-from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.rig.config import Limits
 from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics, remember_clean_displacement
@@ -45,6 +45,11 @@ class PreflightRecord:
     """Contradictions between the file and the config."""
     ingested: tuple[IngestRow, ...] = ()
     """Steps from the file to this record."""
+
+    @cached_property
+    def constant_control(self) -> bool:
+        """Whether the control signal stands still: one element and one gain then hold for the whole record."""
+        return is_constant(self.record, voltage_scale([self.record]))
 
     def channels(self) -> tuple[Channel, ...]:
         """Return every recorded channel but the clock: force and motion first, then what labels the record."""

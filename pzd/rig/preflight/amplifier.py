@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry
-from pzd.record import MAD_TO_SIGMA, Array, is_constant, voltage_scale
+from pzd.record import MAD_TO_SIGMA, Array
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.force import best_delay
 from pzd.rig.preflight.reference import WORTH, ReferenceFit, Section, columns, fit_element, reference_fit, sampled_fit
@@ -33,7 +33,7 @@ EXPLAINS = 0.25
 
 def amplifier(test: PreflightRecord) -> Iterator[Finding]:
     """Find what a channel does to the whole force, where it explains most of what the reference leaves."""
-    if not is_constant(test.record, voltage_scale([test.record])) or coarse_step(test.record.displacement):
+    if not test.constant_control or coarse_step(test.record.displacement):
         return
     # The average cycle has less noise: where it leaves nothing to explain, the samples need no fit.
     if test.cycles is not None and reference_fit(test)[1].residual < WORTH_OF_RANGE:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import Array, Rows, deviation_from_median, glitches, is_constant, voltage_scale
+from pzd.record import Array, Rows, deviation_from_median, glitches
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
 from pzd.signals.harmonics import LEAST_RATE, MAINS, line_amplitudes
@@ -100,7 +100,7 @@ LABEL_SHARE = 50.0
 def hum(test: PreflightRecord) -> Iterator[Finding]:
     """Find a line at 50 or 60 Hz that stands out of its neighbourhood in the spectrum of a channel."""
     frequency = test.cycles.frequency if test.cycles else 0.0
-    moving = not is_constant(test.record, voltage_scale([test.record]))
+    moving = not test.constant_control
     for channel in test.channels():
         if channel.name == test.control.name and moving:
             continue  # a stepped signal has lines of its own

@@ -20,7 +20,6 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry
-from pzd.record import is_constant, voltage_scale
 from pzd.rig.preflight import PreflightRecord
 from pzd.rig.preflight.reference import LEAST_RESIDUAL, WORTH, Section, columns, fit_element, reference_fit
 from pzd.rig.preflight.sensors import coarse_step
@@ -59,6 +58,8 @@ def offset(test: PreflightRecord) -> Iterator[Finding]:
 
     Equation: F = F_0 + k f(T0/k, C/k) + c_1 x + c_2 a               Source: least squares on a coarse element
     """
+    if not test.constant_control:
+        return
     section, fit = reference_fit(test)
     design = columns(section, fit)[section.shown]
     slip = min(np.mean(sign * design[:, 1] > fit.friction_extension) for sign in (1.0, -1.0))
@@ -164,7 +165,7 @@ ALIKE_DELAYS = 0.25
 
 def delay(test: PreflightRecord) -> Iterator[Finding]:
     """Find a delay of the force against the displacement that a Bingham element asks for."""
-    if not is_constant(test.record, voltage_scale([test.record])) or coarse_step(test.record.displacement):
+    if not test.constant_control or coarse_step(test.record.displacement):
         return  # what coarse steps do to the reversals passes for a delay
     section, undelayed = reference_fit(test)
     if undelayed.residual < WORTH:

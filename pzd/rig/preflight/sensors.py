@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import Array, Rows, is_constant, voltage_scale
+from pzd.record import Array, Rows
 from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import counted
 from pzd.signals.measures import noise_beside_motion, resolution
@@ -202,7 +202,7 @@ BETTER = 4.0
 def _sizes_by_cycle(test: PreflightRecord) -> Array | None:
     """Return the logarithm of the force's r.m.s. in each cycle but the first; None where the cycles are no repeats."""
     run = test.cycles
-    if run is None or run.count < CYCLES or not is_constant(test.record, voltage_scale([test.record])):
+    if run is None or run.count < CYCLES or not test.constant_control:
         return None
     folded = run.fold(test.record.time, test.record.force)[1:]
     moved = run.fold(test.record.time, test.clean.displacement)[1:]
@@ -272,7 +272,7 @@ def drift(test: PreflightRecord) -> Iterator[Finding]:
     from scipy.special import stdtrit
 
     run = test.cycles
-    if run is None or run.count < DRIFT_CYCLES:
+    if run is None or run.count < DRIFT_CYCLES or not test.constant_control:
         return
     folded = run.fold(test.record.time, test.record.force)[1:]
     means, order = folded.mean(axis=1), np.arange(run.count - 1, dtype=np.float64)
