@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -70,7 +71,8 @@ def same_row(other: ParameterRow, row: ParameterRow, force: float) -> None:
             assert getattr(other, column) is None
             continue
         near(getattr(other, column), force * value, force * (high - low))
-    assert other.status == row.status
+    # How wide the interval is of what no test determines goes by where the search ended.
+    assert re.sub(r"\d+ %", "# %", other.status) == re.sub(r"\d+ %", "# %", row.status)
 
 
 def wide(high: float | Sequence[float] | None, low: float | Sequence[float] | None) -> np.ndarray:
