@@ -190,7 +190,8 @@ def _searched(
         support = support_of(adoption, validation, (*decision.alike, *_may_be_none(adoption.selection, control)))
         decision = with_parts_told(decision, support)
         selection, prediction = adoption.selection, adoption.prediction(validation)
-        before = campaign.checks(selection.baseline.damper)
+        plain_selection = judged.without_seal or selection
+        before = campaign.checks(plain_selection.baseline.damper)
         log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
         limits = (
             hold_out_note(roles.hold_out),
@@ -216,7 +217,9 @@ def _searched(
             ),
             effects=selection.adopted,
             confidence=decision.confidence,
-            gap=held_out_gap(selection, validation if adoption.by_criterion else None),
+            gap=held_out_gap(
+                selection, validation if adoption.by_criterion else None, plain_selection.initial_evidence
+            ),
             parameters=parameters_of(handed_on, control),
             prediction=prediction,
             zero_m=final.zero_m,
@@ -274,6 +277,8 @@ class _Judged:
     conclusion: Conclusion
     zeros: str = ""
     """What the reason says of the zeros of the load cell."""
+    without_seal: Selection | None = None
+    """What was selected beside T0, C and k alone, where this is beside a seal: it has the simple model."""
 
 
 def _judged(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
@@ -342,7 +347,7 @@ def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     plain = adoption.baseline_error
     if predicts_worse(found.error, adoption.error) or not improves(found.error, plain, again.validation):
         return first
-    return replace(again, conclusion=(replace(found, baseline_error=plain), named))
+    return replace(again, conclusion=(replace(found, baseline_error=plain), named), without_seal=selection)
 
 
 def _seal_note(damper: Damper, law: Sequence[str]) -> str:
@@ -665,7 +670,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
     return tuple(rows)
 
 
-def held_out_gap(selection: Selection, validation: CrossValidation | None = None) -> Gap:
+def held_out_gap(selection: Selection, validation: CrossValidation | None = None, plain: Evidence | None = None) -> Gap:
     """Compute criterion (4) on the held-out samples before and after, with nuisances at their prior mean.
 
     Both dampers are fitted to the training samples alone.
@@ -674,8 +679,9 @@ def held_out_gap(selection: Selection, validation: CrossValidation | None = None
     ----------
     selection : effects adopted, and the evidence whose first half trains
     validation : the tests, where the adopted damper is fitted by criterion (4); None where it is by likelihood
+    plain : evidence for the fit of the simple model, where the selection is beside another law
     """
-    campaign, training = selection.initial_evidence.campaign, selection.initial_evidence.halves[0]
+    campaign, training = selection.initial_evidence.campaign, (plain or selection.initial_evidence).halves[0]
     baseline = plain_fit(training).damper
     before = held_out_criterion(campaign.held_out_checks(baseline), campaign.split)
     if not selection.adopted:
