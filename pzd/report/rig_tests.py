@@ -13,7 +13,7 @@ from pzd.artefacts import Characteristics, Identified, RecordEntry, Rig
 from pzd.identification.prepared_record import warm_up
 from pzd.quantities import Control
 from pzd.record import Record, is_constant, voltage_scale
-from pzd.report.blocks import amount, shortened
+from pzd.report.blocks import amount, number, shortened
 
 _SINE_SPEED_RATIO = 1.5
 """A motion whose peak speed is at most so many times that of a sine of its amplitude is a simple swing.
@@ -86,10 +86,26 @@ class RigTests:
 
     def conditions(self, record: Record) -> str:
         """Return the conditions of a record in words; its motion where it has none."""
-        parts = [amount(self.level(record), self.control.unit)] if record.voltage is not None else []
+        parts = [self._signal(record)] if record.voltage is not None else []
         if record.temperature is not None:
             parts.append(amount(record.median_temperature(), "degC"))
         return ", ".join(parts) or self.motion(record)
+
+    def _signal(self, record: Record) -> str:
+        """Return the control signal of a record in words: its level, or from where to where it moves."""
+        if record.voltage is None or not self.moves(record):
+            return amount(self.level(record), self.control.unit)
+        low, high = np.percentile(record.voltage, (1.0, 99.0))
+        return f"{number(float(low), 3)} to {amount(float(high), self.control.unit, 3)}"
+
+    def moves(self, record: Record) -> bool:
+        """Tell whether the control signal moves in a record: no mean of its cycles is a cycle then."""
+        return record.name in self._moving
+
+    @cached_property
+    def _moving(self) -> frozenset[str]:
+        scale = voltage_scale(self.records)
+        return frozenset(record.name for record in self.records if not is_constant(record, scale))
 
     def motion(self, record: Record) -> str:
         """Return frequency and amplitude of a record; its name where it does not repeat or holds several tests."""
@@ -146,7 +162,8 @@ class RigTests:
     @cached_property
     def shown(self) -> tuple[Record, ...]:
         """The records shown as force: of each voltage the fastest sine or triangle, spread over the voltages."""
-        ordered = sorted(self.records, key=lambda r: (self.is_simple_swing(r), float(np.abs(r.velocity).max())))
+        constant = [record for record in self.records if not self.moves(record)] or self.records
+        ordered = sorted(constant, key=lambda r: (self.is_simple_swing(r), float(np.abs(r.velocity).max())))
         by_voltage = {self.level(record): record for record in ordered}
         chosen = sorted(by_voltage.values(), key=lambda r: self.level(r) or 0.0)
         if len(chosen) == 1:
@@ -165,9 +182,8 @@ class RigTests:
 
     def by_motion_of_voltage(self) -> tuple[list[Record], list[Record]]:
         """Part the sampled records into those of constant and those of varying voltage."""
-        scale = voltage_scale(self.sampled)
-        constant = [record for record in self.sampled if is_constant(record, scale)]
-        return constant, [record for record in self.sampled if not is_constant(record, scale)]
+        constant = [record for record in self.sampled if not self.moves(record)]
+        return constant, [record for record in self.sampled if self.moves(record)]
 
     def at_some_voltages(self) -> dict[str, list[Record]]:
         """Return sampled records of the lowest, a middle and the highest voltage by label; under "" without control."""

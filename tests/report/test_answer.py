@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pzd.artefacts import Rig
 from pzd.report.blocks import amount, typewritten
 from pzd.report.config import ReportConfig
 from pzd.report.page import answer, told
@@ -62,6 +64,25 @@ def test_what_the_user_says_of_the_damper_stands_in_the_head(run: Any) -> None:
     head = page.partition('class="answer-line"')[0]
     assert "<dt>serial number</dt><dd>117</dd>" in head
     assert "<dt>operator</dt><dd>N. &lt;N&gt;</dd>" in head
+
+
+def test_what_the_drive_lacks_is_shown_where_the_control_signal_moves(run: Any, context_of: Any) -> None:
+    """No constant test misses anything of a lag; the mean of cycles in which the signal steps would be no cycle."""
+    steady = run.rig.records[0]
+    stepped = replace(
+        steady,
+        name="stepped",
+        voltage=np.where(steady.time < 0.5 * steady.time[-1], 0.0, 150.0),
+        force=steady.force + 900.0 * (np.abs(steady.time - 0.5 * steady.time[-1]) < 0.05),
+    )
+    moved = Rig(
+        (*run.rig.records, stepped), (*run.rig.entries, run.rig.entries[0].model_copy(update={"name": stepped.name}))
+    )
+    context = context_of(replace(run, rig=moved))
+    (panel,) = missed_loop(context)
+    assert panel.caption.startswith("stepped at 0 to 150\u00a0V")
+    assert stepped not in context.tests.shown
+    assert "stepped, 0 to 150\u00a0V, 22\u00a0°C" in context.tests.labels(moved.records)
 
 
 def test_the_difference_below_is_measured_less_model_on_a_scale_of_its_own(run: Any, context_of: Any) -> None:
