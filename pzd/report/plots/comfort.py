@@ -6,6 +6,7 @@ Acceleration over time, scale of reactions, chart of 1978, and comfort against w
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -187,6 +188,8 @@ def _exposure_lines(ax: Axes) -> None:
 
 _NAMES_IN = 1.45
 """Room for the names, to the right [in]."""
+_NAME_WIDE = 20
+"""Characters of a line of a name that this room holds."""
 _LINE_IN = 0.16
 """Height of a line of names [in]."""
 _AROUND_IN = 0.75
@@ -272,7 +275,7 @@ def _write_names(ax: Axes, context: ReportContext, rows: Sequence[SummaryRow], b
     for row, place in zip(rows, places, strict=True):
         colour, _ = _trade_off_style(context, row)
         ax.annotate(
-            context.control.told(spelled(row.policy)),
+            fill(context.control.told(spelled(row.policy)), _NAME_WIDE),
             (row.rms_wheel_load_N, context.rated.a_w(row)),
             (1.06, place),
             textcoords="axes fraction",
