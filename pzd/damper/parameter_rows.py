@@ -291,7 +291,7 @@ def nodes_of(damper: Damper, temperature: float | None) -> DamperNodes:
     listed = [values[NODE_VOLTAGES] for values in damper.effects.values() if NODE_VOLTAGES in values]
     voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
     effects = {name: _interpolated(values, voltages) for name, values in damper.effects.items()}
-    return nodes_with(voltages, bingham_parameters(damper, voltages, temperature), effects)
+    return nodes_with(voltages, bingham_parameters(damper, voltages, temperature), effects, drive_row_of(damper))
 
 
 def _interpolated(values: EffectValues, voltages: Array) -> dict[str, float | Array]:
@@ -304,7 +304,9 @@ def _interpolated(values: EffectValues, voltages: Array) -> dict[str, float | Ar
     }
 
 
-def nodes_with(voltages: Array, base: Array, effects: Mapping[str, Mapping[str, NodeValue]]) -> DamperNodes:
+def nodes_with(
+    voltages: Array, base: Array, effects: Mapping[str, Mapping[str, NodeValue]], drive: Array
+) -> DamperNodes:
     """Assemble the rows of a damper at some voltages.
 
     Parameters
@@ -312,18 +314,14 @@ def nodes_with(voltages: Array, base: Array, effects: Mapping[str, Mapping[str, 
     voltages : (m,) rising [V]
     base : (m, 3) or (1, 3) T0 [N], C [N s/m] and k [N/m] there
     effects : values by effect and parameter, (m,) where they differ by voltage
-
-    Raises
-    ------
-    ValueError : when a parameter of the drive has one value per voltage
+    drive : (d,) row of the drive, see `drive_row`
     """
     rows = np.empty((voltages.size, 3 + len(STROKE_AND_FLOW)))
     rows[:, :3] = base
     _fill_columns(rows[:, 3:], STROKE_AND_FLOW, effects)
-    parallel, drive = np.empty((voltages.size, len(PARALLEL))), np.empty((1, len(DRIVE)))
+    parallel = np.empty((voltages.size, len(PARALLEL)))
     _fill_columns(parallel, PARALLEL, effects)
-    _fill_columns(drive, DRIVE, effects)
-    return DamperNodes(voltages, rows, parallel, drive[0])
+    return DamperNodes(voltages, rows, parallel, drive)
 
 
 def _fill_columns(rows: Array, columns: tuple[Column, ...], effects: Mapping[str, Mapping[str, NodeValue]]) -> None:

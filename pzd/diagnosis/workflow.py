@@ -325,7 +325,9 @@ def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     if decision.verdict != "unexplained" or config.force or first.campaign.law or left > thresholds.SEAL_LEAVES:
         return first
     # The seal takes the place of what looked like another effect, and brings none.
-    sure = tuple(name for name in selection.adopted if name not in decision.alike)
+    sure = {*selection.adopted} - {*decision.alike}
+    if not sure:
+        return first
     campaign = replace(first.campaign, law=(seal.EFFECT.name,))
     scales = selection.initial_evidence.whole.scales
     start = {p.name: p.search.starts[0] * p.search.scale(scales) for p in seal.EFFECT.parameters}
@@ -338,11 +340,11 @@ def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     together = rubbed(selection.fitted.damper.without_effects(*decision.alike))
     beside = campaign.checks(refit(evidence_of(campaign, together).whole, together).damper)
     sizes = visible_gap(checks(selection.baseline.damper)), visible_gap(beside)
-    if not sure or leaves_too_much(sizes, probability_of_noise(beside), config):
+    if leaves_too_much(sizes, probability_of_noise(beside), config):
         return first
     again = _judged(campaign, rubbed(baseline), config, unit)
     found, named = again.conclusion
-    if named.verdict not in ("named", "ambiguous") or not {*found.selection.adopted} <= {*sure}:
+    if named.verdict not in ("named", "ambiguous") or not {*found.selection.adopted} <= sure:
         return first
     plain = adoption.baseline_error
     if predicts_worse(found.error, adoption.error) or not improves(found.error, plain, again.validation):

@@ -194,7 +194,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
     directions = found.directions()
     of_direction = (*conditions(control, lambda each: each.row), Column("direction", "direction"))
     yield Table(
-        "Law of the element by identify",
+        "Law of the element that identify chose",
         (Column("setting", "setting", optional=True), Column("law", "law"), Column("reason", "reason")),
         found.laws,
     )

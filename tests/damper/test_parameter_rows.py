@@ -92,6 +92,13 @@ def test_a_gas_spring_of_one_value_at_every_node_counts_from_another_place_too()
     assert moved.effects["preload_offset"] == {"F_0": (10.0, 10.0), "at_voltage_V": (0.0, 1.0)}
 
 
+def test_a_lag_for_each_voltage_is_refused_by_name() -> None:
+    rows = tuple(BaseRow(voltage_V=u, T0_N=1.0, C_Ns_per_m=1.0, k_N_per_m=1e6) for u in (0.0, 1.0))
+    damper = Damper(base=rows, effects={"valve_lag": {"tau": (0.01, 0.02), "at_voltage_V": (0.0, 1.0)}})
+    with pytest.raises(ValueError, match=r"valve_lag\.tau must be one number, not a list by voltage"):
+        nodes_of(damper, None)
+
+
 def test_an_uneven_time_gives_the_same_force(rng: np.random.Generator) -> None:
     uneven = np.sort(rng.uniform(0, 1, 3000))
     omega = 2 * np.pi * 2

@@ -142,7 +142,7 @@ def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_directi
     ):
         assert cell in page
     assert "21.5" in page
-    assert "Law of the element by identify" in page
+    assert "Law of the element that identify chose" in page
 
 
 def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> None:

@@ -15,7 +15,7 @@ from pzd.damper.effect import NODE_VOLTAGES, Effect, EffectValues, Parameter, Sc
 from pzd.damper.element import STIFFEST
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.parameter_rows import DamperNodes, nodes_of, nodes_with, rows_per_voltage
+from pzd.damper.parameter_rows import DamperNodes, drive_row, nodes_of, nodes_with, rows_per_voltage
 from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.fit.element_coordinates import ElementCoordinates
 from pzd.record import Array
@@ -341,7 +341,8 @@ class Point:
         base[list(self.problem.nodes)] = self.base
         if len(base) > 1:
             base[:, 2] = np.minimum(base[:, 2], STIFFEST)  # between two infinite ones nothing is linear
-        return nodes_with(np.array(self.problem.voltages), base, self.effects)
+        drive = {name: cast("Mapping[str, float]", own) for name, own in self.effects.items()}  # one value for all
+        return nodes_with(np.array(self.problem.voltages), base, self.effects, drive_row(drive))
 
     def _node_voltages(self, effect: str) -> dict[str, tuple[float, ...]]:
         return {NODE_VOLTAGES: self.problem.voltages} if effect in self.problem.per_voltage else {}
