@@ -70,6 +70,8 @@ class RecordEntry(Frozen):
     """Sampling rate."""
     cycles: float
     """Number of cycles of the motion."""
+    control_moves: bool = False
+    """Whether the control signal moves, so that no one T0, C and k describe the record."""
     displacement_rms_m: float | None = None
     """R.m.s. of the displacement about its mean."""
     velocity_rms_m_per_s: float | None = None

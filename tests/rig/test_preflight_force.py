@@ -115,3 +115,21 @@ def test_a_steady_force_towards_rebound_asks_which_way_is_rebound(gas: float) ->
 def test_an_offset_that_comes_with_the_speed_alone_is_no_gas() -> None:
     told = explained([20.0 * n for n in range(1, 7)], [0.1 * n for n in range(1, 7)])
     assert all(each.startswith("it goes with the speed of the test, as where rebound is unlike") for each in told)
+
+
+def test_a_test_whose_control_signal_moves_says_nothing_of_an_offset() -> None:
+    entries = tuple(
+        RecordEntry(
+            name=f"test {n}",
+            setting=None,
+            voltage_V=1.0,
+            temperature_degC=None,
+            rate_Hz=500.0,
+            cycles=6.0,
+            control_moves=n == 4,
+            findings=() if n == 4 else (Finding(check="offset", where="force", size=-200.0, unit="N", follows=""),),
+        )
+        for n in range(5)
+    )
+    told = [entry.findings[0].follows for entry in explain_offsets(entries) if entry.findings]
+    assert all("alike in all 4 records of this setting, as a preload or a gas force is" in each for each in told)

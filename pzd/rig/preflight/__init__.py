@@ -136,6 +136,7 @@ def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, prefligh
             rate_Hz=record.rate,
             # A cycle of a motion that does not repeat goes to either side.
             cycles=float(run.count) if run else 0.5 * len(reversals(record.displacement)),
+            control_moves=not test.constant_control,
             displacement_rms_m=float(np.std(record.displacement)),
             velocity_rms_m_per_s=float(np.std(record.velocity)),
             acceleration_rms_m_per_s2=float(np.std(record.acceleration)),

@@ -82,16 +82,17 @@ def explain_offsets(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]
     rebound is unlike compression the offset goes with the speed, from nothing at rest. A tare may change from file to
     file, and a force and a displacement that are both turned over show the offset with the other sign.
     """
-    return tuple(_explained(entry, [o for o in entries if o.setting == entry.setting]) for entry in entries)
+    shown = [entry for entry in entries if not entry.control_moves]
+    return tuple(_explained(entry, [o for o in shown if o.setting == entry.setting]) for entry in entries)
 
 
 def _explained(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
     mine, offsets = _offset_of(entry), [_offset_of(other) for other in entries]
+    if mine == 0.0 or len(offsets) < LEAST_RECORDS:
+        return entry
     usual = float(np.median(offsets))
     # The median of two groups is the offset of neither.
     any_usual = np.mean(np.abs(np.array(offsets) - usual) <= ALIKE_OFFSETS * abs(usual)) > 0.5
-    if mine == 0.0 or len(offsets) < LEAST_RECORDS:
-        return entry
     alike = f"in all {len(offsets)} records of this setting, as a preload or a gas force is"
     turned = A_GAS_PUSHES if usual > 0.0 else ""
     chance = _in_order_of(entries, "velocity_rms_m_per_s")
