@@ -15,14 +15,15 @@ import numpy as np
 from pzd.damper.effect import NODE_VOLTAGES, Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.parameter_rows import nearest_condition
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, PreparedRecord, Split
 from pzd.diagnosis.fit.least_squares import FitResult
 from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force, weighed_by_noise, with_nuisances
 from pzd.diagnosis.fit.prediction import PredictedForce, predict
 from pzd.diagnosis.fit.problem import UNSEEN, Budget, Problem, law_of
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.gap import ResidualCheck, check_residual, probability_of_noise, visible_gap
+from pzd.diagnosis.roles import HELD_OUT, TRAINING, VALIDATION, Split
 from pzd.fit.spread import estimated_spread, nuisance_equations
 from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.measures import criterion, criterion_error
@@ -36,7 +37,7 @@ Made = TypeVar("Made")
 class Campaign:
     """The records of one setting, and the roles of their samples."""
 
-    prepared: tuple[PreparedRecord, ...]
+    cleaned: tuple[CleanedRecord, ...]
     split: Split
     nuisance: NuisanceConfig
     jobs: int = 1
@@ -61,7 +62,7 @@ class Campaign:
         """Predict the force of some of the records."""
         key = damper.model_dump_json()
         new = [i for i in numbers if (key, i) not in self._predictions]
-        made = self.parallel_map(lambda i: predict(damper, self.prepared[i], self.nuisance.delay_s), new)
+        made = self.parallel_map(lambda i: predict(damper, self.cleaned[i], self.nuisance.delay_s), new)
         self._predictions.update(zip(((key, i) for i in new), made, strict=True))
         return tuple(self._predictions[key, i] for i in numbers)
 
@@ -84,11 +85,11 @@ class Campaign:
         """Compute the median over the records of the mean residual [N], an offset that no effect has to explain."""
         seen = records_in_use(self.seen)
         predicted = zip(seen, self.predictions(damper, seen), strict=True)
-        return float(np.median([np.mean(self.prepared[i].record.force - each.force) for i, each in predicted]))
+        return float(np.median([np.mean(self.cleaned[i].record.force - each.force) for i, each in predicted]))
 
     def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[ResidualCheck, ...]:
         used = records_in_use(masks)
-        predicted = [(e, self.prepared[i], masks[i]) for i, e in zip(used, self.predictions(damper, used), strict=True)]
+        predicted = [(e, self.cleaned[i], masks[i]) for i, e in zip(used, self.predictions(damper, used), strict=True)]
         return self.parallel_map(lambda each: check_residual(*each, self.nuisance), predicted)
 
     def parallel_map(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
@@ -160,20 +161,20 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     campaign : the records, and the roles of their samples
     damper : starting values of the fits; gain and delay of a test act along its force
     """
-    prepared = campaign.prepared
-    base_rows = [nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
+    cleaned = campaign.cleaned
+    base_rows = [nearest_row(damper.base, p) if p.constant else -1 for p in cleaned]
     seen = records_in_use(campaign.seen)
     predicted = dict(zip(seen, campaign.predictions(damper, seen), strict=True))
-    weighed = {i: weighed_by_noise(prepared[i], campaign.seen[i], base_rows[i], predicted[i]) for i in seen}
+    weighed = {i: weighed_by_noise(cleaned[i], campaign.seen[i], base_rows[i], predicted[i]) for i in seen}
     by_noise = [found for found in weighed.values() if found is not None]
     reference = damper.reference_temperature_degC
     if reference is None:
-        recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
+        recorded = [t for t in (p.record.median_temperature() for p in cleaned) if t is not None]
         reference = float(np.median(recorded)) if recorded else None
     problem = Problem(
         tuple(by_noise),
         damper.base,
-        _scales(by_noise, prepared, damper),
+        _scales(by_noise, cleaned, damper),
         reference,
         frozenset(name for name, values in damper.effects.items() if NODE_VOLTAGES in values),
         campaign.budget,
@@ -188,7 +189,7 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
         for i, key in keys:
             if (i, key) not in made:
                 whole = np.array_equal(kept[i], campaign.seen[i])
-                bare = weighed[i] if whole else weighed_by_noise(prepared[i], kept[i], base_rows[i], predicted[i])
+                bare = weighed[i] if whole else weighed_by_noise(cleaned[i], kept[i], base_rows[i], predicted[i])
                 made[i, key] = None if bare is None else with_nuisances(bare, damper, nuisance)
         return tuple(found for key in keys if (found := made[key]) is not None)
 
@@ -221,9 +222,9 @@ def _shown_by_tests(problem: Problem, damper: Damper, prior: NuisanceConfig) -> 
     return NuisanceConfig(offset=offset * prior.offset, gain=gain * prior.gain, delay_s=delay * prior.delay_s)
 
 
-def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecord], damper: Damper) -> Scales:
+def _scales(observed: Sequence[WeightedRecord], cleaned: Sequence[CleanedRecord], damper: Damper) -> Scales:
     """Return the magnitudes by which effect parameters are scaled."""
-    records, peaks = [p.record for p in prepared], [o.peak for o in observed]
+    records, peaks = [p.record for p in cleaned], [o.peak for o in observed]
 
     def largest(channels: Iterable[Array]) -> float:
         return max(float(np.max(np.abs(channel))) for channel in channels)
@@ -237,17 +238,17 @@ def _scales(observed: Sequence[WeightedRecord], prepared: Sequence[PreparedRecor
         largest(r.acceleration for r in records),
         max(float(np.median([row.C_Ns_per_m for row in damper.base])), UNSEEN[0] * max(peaks) / speed),
         voltage_scale(records),
-        flow_of(damper, prepared),
+        flow_of(damper, cleaned),
     )
 
 
-def flow_of(damper: Damper, prepared: Sequence[PreparedRecord]) -> tuple[tuple[float, float], ...]:
+def flow_of(damper: Damper, cleaned: Sequence[CleanedRecord]) -> tuple[tuple[float, float], ...]:
     """Return T0 and the largest force [N] of each condition by the damper itself: noise adds to what is measured.
 
     Equation: T0 + C max abs(v)
     """
     speeds: dict[int, float] = {}
-    for p in prepared:
+    for p in cleaned:
         if p.constant:
             place = nearest_row(damper.base, p)
             speeds[place] = max(speeds.get(place, 0.0), float(np.max(np.abs(p.record.velocity))))
@@ -255,6 +256,6 @@ def flow_of(damper: Damper, prepared: Sequence[PreparedRecord]) -> tuple[tuple[f
     return tuple((row.T0_N, row.T0_N + row.C_Ns_per_m * speed) for row, speed in rows)
 
 
-def nearest_row(rows: Sequence[BaseRow], prepared: PreparedRecord) -> int:
+def nearest_row(rows: Sequence[BaseRow], cleaned: CleanedRecord) -> int:
     """Return the index of the base row of a record."""
-    return nearest_condition(rows, prepared.record.median_voltage(), prepared.record.median_temperature())
+    return nearest_condition(rows, cleaned.record.median_voltage(), cleaned.record.median_temperature())

@@ -19,11 +19,12 @@ from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage, with_rows
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
-from pzd.diagnosis.data import TRAINING, PreparedRecord, Split
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.fit.least_squares import FitResult, refit
 from pzd.diagnosis.fit.likelihood import equally_weighted, residuals_of, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.roles import TRAINING, Split
 from pzd.fit.cross_validation import (
     FOLDS,
     PredictionError,
@@ -67,7 +68,7 @@ class Folds:
         return tuple(np.zeros_like(mask) for mask in self.folds[0])
 
 
-def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
+def assign_folds(cleaned: Sequence[CleanedRecord], baseline: Damper) -> Folds:
     """Assign the tests of each voltage to folds in turn, so that each fold holds out some tests of each voltage.
 
     Those that slip in turn, and those that do not: T0 and C are known from tests that slip, and some are left beside
@@ -75,26 +76,26 @@ def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
 
     Parameters
     ----------
-    prepared : records of one setting
+    cleaned : records of one setting
     baseline : damper whose base rows give the voltages
     """
     nodes = [voltage for voltage, _ in rows_per_voltage(baseline.base)]
     members: dict[int, list[int]] = {}
-    for i, p in enumerate(prepared):
+    for i, p in enumerate(cleaned):
         own = p.record.median_voltage() or 0.0
         members.setdefault(int(np.argmin([abs(v - own) for v in nodes])) if p.constant else -1, []).append(i)
-    groups = tuple(tuple(sorted(found, key=lambda i: prepared[i].record.name)) for found in members.values())
+    groups = tuple(tuple(sorted(found, key=lambda i: cleaned[i].record.name)) for found in members.values())
     voltages = tuple(None if node < 0 else nodes[node] for node in members)
-    sizes = [p.record.time.size for p in prepared]
+    sizes = [p.record.time.size for p in cleaned]
     folds = tuple(tuple(np.zeros(n, dtype=np.bool_) for n in sizes) for _ in range(FOLDS))
     lone = set[int]()
     for turn, (group, voltage) in enumerate(zip(groups, voltages, strict=True)):
         several = len(group) > 1 and voltage is not None
-        slipping = [i for i in group if several and _slips(prepared[i], baseline)] or [*group]
+        slipping = [i for i in group if several and _slips(cleaned[i], baseline)] or [*group]
         dealt = [slipping, [i for i in group if i not in slipping]]
         if len(slipping) == 1:
             lone.update(slipping)
-            for part, mask in enumerate(_halves(prepared[slipping[0]])):
+            for part, mask in enumerate(_halves(cleaned[slipping[0]])):
                 folds[(turn + part) % FOLDS][slipping[0]][:] = mask
             dealt = dealt[1:]
         for tests in dealt:
@@ -104,7 +105,7 @@ def assign_folds(prepared: Sequence[PreparedRecord], baseline: Damper) -> Folds:
     return Folds(groups, voltages, kept, frozenset(lone))
 
 
-def _slips(prepared: PreparedRecord, damper: Damper) -> bool:
+def _slips(cleaned: CleanedRecord, damper: Damper) -> bool:
     """Whether a test shows T0 and C: a larger T0 and C change its force. Where nothing slips, k alone makes the force.
 
     Equation: rms(F((1 + s) T0, (1 + s) C) - F(T0, C)) >= d max abs(F)
@@ -113,13 +114,13 @@ def _slips(prepared: PreparedRecord, damper: Damper) -> bool:
     scaled = ({"T0_N": more * row.T0_N, "C_Ns_per_m": more * row.C_Ns_per_m} for row in damper.base)
     base = tuple(row.model_copy(update=values) for row, values in zip(damper.base, scaled, strict=True))
     resisting = damper.model_copy(update={"base": base})
-    force, stronger = (predicted_force(each, prepared) for each in (damper, resisting))
+    force, stronger = (predicted_force(each, cleaned) for each in (damper, resisting))
     return rms(stronger - force) >= thresholds.RESISTANCE_SHOWN * float(np.max(np.abs(force)))
 
 
-def _halves(prepared: PreparedRecord) -> tuple[Mask, Mask]:
+def _halves(cleaned: CleanedRecord) -> tuple[Mask, Mask]:
     """Return masks (n,) of the first and second half of a record, by whole cycles where it has two or more."""
-    time, run = prepared.record.time, prepared.cycles
+    time, run = cleaned.record.time, cleaned.cycles
     if run is None or run.count < PARTS:
         first = np.arange(time.size) < time.size // PARTS
     else:
@@ -233,7 +234,7 @@ class CrossValidation(Folds):
         """
         ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
         slopes = np.split(fitted.jacobian.dense(), ends)
-        number = {p.record.name: i for i, p in enumerate(self.campaign.prepared)}
+        number = {p.record.name: i for i, p in enumerate(self.campaign.cleaned)}
         records = [number[o.name] for o in problem.observations]
         members = ([i for i, record in enumerate(records) if record in tests] for tests in self.held_out_tests())
         left = held_out_residuals(slopes, fitted.residuals, [fold for fold in members if fold], fitted.prior)
@@ -245,7 +246,7 @@ class CrossValidation(Folds):
             grown = square / max(float(seen @ seen), np.finfo(np.float64).tiny)
             error, energy, spread = squared_sums(o.measured, o.measured - force)
             negligible = o.measured.size * (self.visible * o.peak) ** 2
-            count = self.campaign.prepared[record].record.time.size / o.measured.size
+            count = self.campaign.cleaned[record].record.time.size / o.measured.size
             entries.append(tuple(count * each for each in (grown * error, energy, spread, negligible)))
         return PredictionError.of_entries(records, entries)
 
@@ -315,7 +316,7 @@ class CrossValidation(Folds):
             if before.criterion is not None and after.criterion is not None:
                 tests.append(
                     HeldOutTest(
-                        record=self.campaign.prepared[i].record.name,
+                        record=self.campaign.cleaned[i].record.name,
                         voltage=voltage if controlled else None,
                         W_s_plain=before.criterion,
                         W_s=after.criterion,
@@ -336,7 +337,7 @@ class CrossValidation(Folds):
         """Return what the folds hold out: whole tests, or parts of tests that are alone at their voltage."""
         kinds: set[HoldOut] = {"tests"} if any(i not in self.lone for group in self.groups for i in group) else set()
         for i in self.lone:
-            kinds.add("segments" if self.campaign.prepared[i].cycles is None else "cycles")
+            kinds.add("segments" if self.campaign.cleaned[i].cycles is None else "cycles")
         return kinds.pop() if len(kinds) == 1 else "mixed"
 
     def _left_out(self, group: int, interpolation: PredictionError) -> HeldOutVoltage | None:
@@ -350,7 +351,7 @@ class CrossValidation(Folds):
         """Compute the error at one voltage, refitted without it and without the tests whose voltage moves."""
         mine = self.groups[group]
         moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
-        sizes = [p.record.time.size for p in self.campaign.prepared]
+        sizes = [p.record.time.size for p in self.campaign.cleaned]
         damper = refit(tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes)))
         return self._error_of_fold(damper, tuple(np.full(n, i in mine) for i, n in enumerate(sizes)))
 
@@ -376,7 +377,7 @@ class CrossValidation(Folds):
         records, entries = list[int](), list[tuple[float, ...]]()
         if damper is None:
             return PredictionError.of_entries(records, entries)
-        for i, (p, mask) in enumerate(zip(self.campaign.prepared, held_out, strict=True)):
+        for i, (p, mask) in enumerate(zip(self.campaign.cleaned, held_out, strict=True)):
             kept = mask & comparable_samples(p)
             if not kept.any():
                 continue
@@ -389,7 +390,7 @@ class CrossValidation(Folds):
             entries.append((*squared_sums(force, residual), negligible, self._beyond_own(p, residual, kept)))
         return PredictionError.of_entries(records, entries)
 
-    def _beyond_own(self, p: PreparedRecord, residual: Array, kept: Mask) -> float:
+    def _beyond_own(self, p: CleanedRecord, residual: Array, kept: Mask) -> float:
         """Compute the squares of a residual beyond what offset, gain and delay of its test explain [N^2]."""
         rest = float(residual @ residual)
         if not np.isfinite(rest) or rest == 0.0:
@@ -436,7 +437,7 @@ class CrossValidation(Folds):
             found = _reduced_problem(campaign, problem, damper, held_out, NO_NUISANCE)
             if found is None:
                 return None
-            pairs = zip(campaign.prepared, held_out, strict=True)
+            pairs = zip(campaign.cleaned, held_out, strict=True)
             fitted = {p.record.name: int(np.count_nonzero(~mask & comparable_samples(p))) for p, mask in pairs}
             weighted = (equally_weighted(o, fitted[o.name], peaks[o.base_row]) for o in found.observations)
             return replace(found, observations=tuple(weighted))
@@ -450,7 +451,7 @@ def _reduced_problem(
     """Return the problem without the held-out samples; None where nothing is left."""
     known = {o.name: o for o in problem.observations}
     kept = []
-    for i, (p, mask) in enumerate(zip(campaign.prepared, held_out, strict=True)):
+    for i, (p, mask) in enumerate(zip(campaign.cleaned, held_out, strict=True)):
         part = known.get(p.record.name)
         if part is None or mask.all():
             continue
@@ -498,8 +499,8 @@ def cross_validation_of(campaign: Campaign, baseline: Damper, visible: float) ->
     baseline : damper as identify found it
     visible : a gap (r.m.s.) below this share of a test's peak force does not count
     """
-    prepared = campaign.prepared
-    everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
-    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.budget, campaign.law)
-    folds = assign_folds(prepared, baseline)
+    cleaned = campaign.cleaned
+    everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in cleaned), (), "records")
+    whole = Campaign(cleaned, everything, campaign.nuisance, campaign.jobs, campaign.budget, campaign.law)
+    folds = assign_folds(cleaned, baseline)
     return CrossValidation(folds.groups, folds.voltages, folds.folds, folds.lone, whole, baseline, visible)

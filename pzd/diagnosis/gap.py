@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import Gap, Region
 from pzd.diagnosis import thresholds
-from pzd.diagnosis.data import PreparedRecord, Split
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.fit.prediction import PredictedForce, comparable_samples, drawn_calm, unresolved_turns
+from pzd.diagnosis.roles import Split
 from pzd.record import CONSTANT_SHARE, Array, Mask, Record
 from pzd.signals import lack_of_fit
 from pzd.signals.harmonics import hum
@@ -27,7 +28,7 @@ from pzd.signals.nuisance import NuisanceConfig, likely_delay, nuisance_forces
 class ResidualCheck:
     """Residual of one record against a damper, over the checked samples, with its noise."""
 
-    prepared: PreparedRecord
+    cleaned: CleanedRecord
     wanted: Mask
     """(n,) checked samples."""
     calm: Mask
@@ -59,23 +60,23 @@ class ResidualCheck:
     @property
     def predicted(self) -> Array:
         """(n,) force that the damper gives [N]."""
-        return self.prepared.record.force - self.residual
+        return self.cleaned.record.force - self.residual
 
     @property
     def peak(self) -> float:
         """Peak force of the record [N]."""
-        return float(np.max(np.abs(self.prepared.record.force)))
+        return float(np.max(np.abs(self.cleaned.record.force)))
 
 
 def check_residual(
-    given: PredictedForce, prepared: PreparedRecord, wanted: Mask, config: NuisanceConfig
+    given: PredictedForce, cleaned: CleanedRecord, wanted: Mask, config: NuisanceConfig
 ) -> ResidualCheck:
     """Compare a record with its predicted force, over the wanted samples past the warm-up.
 
     Parameters
     ----------
     given : force that a damper predicts for the record
-    prepared : the record
+    cleaned : the record
     wanted : (n,) samples that are asked for
     config : how far offset, gain and delay of a test may go
 
@@ -83,16 +84,16 @@ def check_residual(
     -------
     what is left of the force in these samples, and how probable it is by noise alone
     """
-    record = prepared.record
+    record = cleaned.record
     predicted, residual = given.force, record.force - given.force
-    mask = wanted & comparable_samples(prepared)
-    run, peak = prepared.cycles, float(np.max(np.abs(record.force)))
+    mask = wanted & comparable_samples(cleaned)
+    run, peak = cleaned.cycles, float(np.max(np.abs(record.force)))
     # The mains nearly repeat from cycle to cycle, as a gap does.
     mains = hum(record.time, residual, mask, run.frequency if run else 0.0, thresholds.LEAST_HUM * peak)
     without = residual - mains
-    calm = jump_bend(prepared, predicted) + unresolved_turns(given.damper, record.displacement) == 0.0
-    variance = _difference_variance(prepared, without, mask, calm)
-    force, shifted = record.force - mains, _shifted(prepared, predicted)
+    calm = jump_bend(cleaned, predicted) + unresolved_turns(given.damper, record.displacement) == 0.0
+    variance = _difference_variance(cleaned, without, mask, calm)
+    force, shifted = record.force - mains, _shifted(cleaned, predicted)
 
     def explained_with(late: Array) -> Array:
         """Return the (n,) part explained where a shifted prediction is the one that gain and offset act along [N]."""
@@ -109,23 +110,23 @@ def check_residual(
     delay = likely_delay(force[mask], lambda late: shifted(late)[mask], variance, config, calm[mask])
     ways = explained_with(predicted), explained_with(shifted(delay))
     explained = mains + min(ways, key=lambda way: float(np.sum((without - way)[mask] ** 2)))
-    folded = _folded(prepared, residual - explained, mask)
+    folded = _folded(cleaned, residual - explained, mask)
     if folded is not None:
-        found = _check_cycles(prepared, mask, calm, residual, explained, folded, given.shared_variance)
+        found = _check_cycles(cleaned, mask, calm, residual, explained, folded, given.shared_variance)
     else:
         drawn = drawn_calm(given, calm, mask)
-        found = _check_samples(prepared, mask, calm, residual, explained, predicted, drawn)
+        found = _check_samples(cleaned, mask, calm, residual, explained, predicted, drawn)
     return replace(found, hum=float(np.max(np.abs(mains))))
 
 
-def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]:
+def _shifted(cleaned: CleanedRecord, force: Array) -> Callable[[float], Array]:
     """Return a predicted force (n,) [N] as a function of a delay [s], by a cubic that does not overshoot a jump.
 
     Beyond either end the motion goes on as it did a cycle before or after, where it repeats; else it rests.
     """
     from scipy.interpolate import Akima1DInterpolator
 
-    time, period = prepared.record.time, 0.0 if prepared.cycles is None else prepared.cycles.period
+    time, period = cleaned.record.time, 0.0 if cleaned.cycles is None else cleaned.cycles.period
     course = Akima1DInterpolator(time, force, method="makima")
 
     def late(delay: float) -> Array:
@@ -136,9 +137,9 @@ def _shifted(prepared: PreparedRecord, force: Array) -> Callable[[float], Array]
     return lambda delay: late(delay) if delay else force
 
 
-def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
+def jump_bend(cleaned: CleanedRecord, predicted: Array) -> Array:
     """Compute (n,) how far the force bends near a jump [N]; 0 elsewhere."""
-    record, run = prepared.record, prepared.cycles
+    record, run = cleaned.record, cleaned.cycles
     if run is None:
         return jumps_in_samples(record.force, predicted, len(reversals(record.displacement)))
     return jumps_in_cycles(run, record.time, record.force)
@@ -160,7 +161,7 @@ def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Ar
 
 
 def _check_cycles(
-    prepared: PreparedRecord,
+    cleaned: CleanedRecord,
     mask: Mask,
     calm: Mask,
     residual: Array,
@@ -177,12 +178,12 @@ def _check_cycles(
     if trend is not None and trend < thresholds.CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
-        prepared, mask, calm, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
+        cleaned, mask, calm, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
     )
 
 
 def _check_samples(
-    prepared: PreparedRecord,
+    cleaned: CleanedRecord,
     mask: Mask,
     calm: Mask,
     residual: Array,
@@ -191,7 +192,7 @@ def _check_samples(
     drawn: Sequence[tuple[Record, Array]],
 ) -> ResidualCheck:
     cleared = (residual - nuisances)[mask]
-    fit = lack_of_fit.fit_smooth_residual(cleared, prepared.record, predicted[mask], mask, drawn)
+    fit = lack_of_fit.fit_smooth_residual(cleared, cleaned.record, predicted[mask], mask, drawn)
     left = cleared - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)
@@ -199,16 +200,16 @@ def _check_samples(
     power = float(np.mean(explained[mask]))
     probability = {"smooth": np.array([fit.probability])}
     return ResidualCheck(
-        prepared, mask, calm, residual, nuisances, variance, power, probability, None, None, 0.0, explained
+        cleaned, mask, calm, residual, nuisances, variance, power, probability, None, None, 0.0, explained
     )
 
 
-def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | None:
+def _folded(cleaned: CleanedRecord, residual: Array, mask: Mask) -> Array | None:
     """Return the wanted whole cycles of the residual, one row each; None with fewer than two."""
-    run = prepared.cycles
+    run = cleaned.cycles
     if run is None:
         return None
-    time = prepared.record.time
+    time = cleaned.record.time
     whole = run.whole(time, mask)
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
@@ -218,12 +219,12 @@ OUT_OF_REACH = 0.01
 which is small beside noise wherever friction does not hide all else. Not tuned."""
 
 
-def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask, calm: Mask) -> float:
+def _difference_variance(cleaned: CleanedRecord, residual: Array, mask: Mask, calm: Mask) -> float:
     """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances.
 
     Those beside a jump tell in which sample it fell: as noise, they would hide what the test has of its own.
     """
-    folded, beside = _folded(prepared, residual, mask), _folded(prepared, np.where(calm, 0.0, 1.0), mask)
+    folded, beside = _folded(cleaned, residual, mask), _folded(cleaned, np.where(calm, 0.0, 1.0), mask)
     if folded is None or beside is None:
         steps, counted = np.diff(residual[mask]), calm[mask][1:] & calm[mask][:-1]
     else:
@@ -260,7 +261,7 @@ def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
                                            Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
     """
     errors = np.concatenate([_by_block(j, j.residual**2) for j in held_out])
-    forces = np.concatenate([_by_block(j, j.prepared.record.force**2) for j in held_out])
+    forces = np.concatenate([_by_block(j, j.cleaned.record.force**2) for j in held_out])
     total = float(forces.sum())
     criterion = float(errors.sum()) / total
     noise, own = np.sum([noise_floors(j) for j in held_out], axis=0) / total
@@ -294,10 +295,10 @@ def noise_floors(check: ResidualCheck) -> tuple[float, float]:
 def _by_block(check: ResidualCheck, values: Array) -> Array:
     """Sum (n,) values over the checked samples of each cycle, or of each block."""
     kept = values[check.wanted]
-    run = check.prepared.cycles
+    run = check.cleaned.cycles
     if run is None:
         return np.array([part.sum() for part in np.array_split(kept, min(BLOCKS, max(kept.size, 1)))])
-    number = run.number(check.prepared.record.time)[check.wanted]
+    number = run.number(check.cleaned.record.time)[check.wanted]
     return np.array([kept[number == j].sum() for j in np.unique(number)])
 
 
@@ -384,7 +385,7 @@ def _points(check: ResidualCheck) -> dict[str, Array]:
 
     The density is the squared residual less its share of noise; it sums to the gap.
     """
-    record, run = check.prepared.record, check.prepared.cycles
+    record, run = check.cleaned.record, check.cleaned.cycles
     names = ("velocity", "displacement", "acceleration")
     if check.folded is None or run is None:
         keep = check.wanted
@@ -418,7 +419,7 @@ def _labels(
         words = _voltages(p["voltage"], unit)
         found["voltage"] = words
         found["velocity and voltage"] = np.char.add(np.char.add(fast, ", "), words)
-    temperature = check.prepared.record.median_temperature()
+    temperature = check.cleaned.record.median_temperature()
     if temperature is not None:
         found["temperature"] = np.full(v.size, f"{temperature:.0f} degC")
     return found
@@ -473,9 +474,9 @@ def _frequencies(checks: Sequence[ResidualCheck], whole: float) -> list[tuple[fl
     """
     power: dict[str, float] = {}
     for check in checks:
-        if check.error is None or check.prepared.cycles is None:
+        if check.error is None or check.cleaned.cycles is None:
             continue
-        words = [_octave(h * check.prepared.cycles.frequency) for h in range(check.error.mean.size)]
+        words = [_octave(h * check.cleaned.cycles.frequency) for h in range(check.error.mean.size)]
         samples = float(np.count_nonzero(check.wanted))
         for word, part in zip(words, repeatable_power(check.error), strict=True):
             power[word] = power.get(word, 0.0) + samples * float(part)

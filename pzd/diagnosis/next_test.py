@@ -17,8 +17,8 @@ from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.cross_validation import CrossValidation
-from pzd.diagnosis.data import PreparedRecord
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array
 from pzd.rig.config import Limits
@@ -67,17 +67,17 @@ class OperatingEnvelope:
 
 
 def operating_envelope(
-    limits: Limits, prepared: Sequence[PreparedRecord], voltages: Sequence[float]
+    limits: Limits, cleaned: Sequence[CleanedRecord], voltages: Sequence[float]
 ) -> OperatingEnvelope:
     """Return the limits of the config, and where it gives none, what the records of this setting reached.
 
     Parameters
     ----------
     limits : of the config; a stroke is about the middle of what was recorded
-    prepared : the records of the setting
+    cleaned : the records of the setting
     voltages : of the damper's base rows [V]
     """
-    records = [p.record for p in prepared]
+    records = [p.record for p in cleaned]
     lowest, highest = _range([r.displacement for r in records])
     amplitude = 0.5 * (highest - lowest if limits.stroke_m is None else limits.stroke_m)
     # To a digit that can be set, a hundredth of the amplitude's first digit or less; + 0.0 leaves no minus before zero.
@@ -90,7 +90,7 @@ def operating_envelope(
         middle,
         amplitude,
         limits.speed_m_per_s or (1.0 + RECORDED_ERROR) * max(float(np.max(np.abs(r.velocity))) for r in records),
-        limits.frequency_Hz or (1.0 + RECORDED_ERROR) * max(frequency_of(p) for p in prepared),
+        limits.frequency_Hz or (1.0 + RECORDED_ERROR) * max(frequency_of(p) for p in cleaned),
         _range([r.force for r in records]) if limits.force_N is None else (-limits.force_N, limits.force_N),
         tuple(sorted({min(max(v, low), high) for v in voltages})),
     )
@@ -100,11 +100,11 @@ def _range(channels: Sequence[Array]) -> tuple[float, float]:
     return min(float(np.min(c)) for c in channels), max(float(np.max(c)) for c in channels)
 
 
-def frequency_of(prepared: PreparedRecord) -> float:
+def frequency_of(cleaned: CleanedRecord) -> float:
     """Return the frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
-    if prepared.cycles is not None:
-        return 1.0 / prepared.cycles.period
-    record = prepared.record
+    if cleaned.cycles is not None:
+        return 1.0 / cleaned.cycles.period
+    record = cleaned.record
     return float(np.max(np.abs(record.velocity)) / (np.pi * np.ptp(record.displacement)))
 
 
@@ -151,7 +151,7 @@ def separating_test(
 
 
 def repeated_longest_test(
-    recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope, moving: Sequence[str] = ()
+    recorded: Sequence[CleanedRecord], envelope: OperatingEnvelope, moving: Sequence[str] = ()
 ) -> NextTest | None:
     """Propose one more test: a sine of many cycles as fast as the stand can, with the stroke of the longest record.
 
@@ -187,7 +187,7 @@ def repeated_longest_test(
     return None
 
 
-def _was_run(test: PreparedRecord, frequency: float, amplitude: float, voltage: float | None) -> bool:
+def _was_run(test: CleanedRecord, frequency: float, amplitude: float, voltage: float | None) -> bool:
     """Whether a test repeats a motion of that frequency [Hz] and amplitude [m] many times, at that control signal."""
     if test.cycles is None or test.cycles.count < MANY or not test.constant:
         return False
@@ -302,7 +302,7 @@ def intermediate_voltage_test(
     offset: float,
     errors: tuple[PredictionError, PredictionError],
     validation: CrossValidation,
-    recorded: Sequence[PreparedRecord],
+    recorded: Sequence[CleanedRecord],
     envelope: OperatingEnvelope,
     temperature: float | None,
 ) -> NextTest | None:

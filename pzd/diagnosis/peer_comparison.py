@@ -14,8 +14,8 @@ from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParam
 from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.model import Damper
 from pzd.diagnosis import narx
+from pzd.diagnosis.cleaned_records import CleanedRecord, clean, unsaturated_records
 from pzd.diagnosis.cross_validation import Folds, assign_folds
-from pzd.diagnosis.data import PreparedRecord, prepare, unsaturated_records
 from pzd.diagnosis.fit.prediction import comparable_samples
 from pzd.diagnosis.narx import Order
 from pzd.diagnosis.peers import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion, peers
@@ -143,7 +143,7 @@ Fitter = Callable[[int | None, Sequence[int]], Predictor]
 class HeldOutTests:
     """The tests of one setting at constant voltage, in the folds of the cross-validation."""
 
-    prepared: tuple[PreparedRecord, ...]
+    cleaned: tuple[CleanedRecord, ...]
     folds: Folds
     _fits: dict[tuple[str, str, int, tuple[bytes, ...]], PeerFit] = field(default_factory=dict, repr=False)
 
@@ -157,7 +157,7 @@ class HeldOutTests:
     def moving(self) -> list[str]:
         """Names of the records whose voltage moves."""
         found = zip(self.folds.voltages, self.folds.groups, strict=True)
-        return [self.prepared[i].record.name for voltage, group in found if voltage is None for i in group]
+        return [self.cleaned[i].record.name for voltage, group in found if voltage is None for i in group]
 
     @property
     def all_samples(self) -> tuple[Mask, ...]:
@@ -174,7 +174,7 @@ class HeldOutTests:
         return self._fits[key]
 
     def _data(self, i: int, fitted: Mask) -> PeerData:
-        p = self.prepared[i]
+        p = self.cleaned[i]
         return PeerData(StrokeMotion.of(p), p.record.force, fitted & comparable_samples(p))
 
     def best_form(
@@ -194,7 +194,7 @@ class HeldOutTests:
 
             def predictor(group: int, i: int) -> Array:
                 parameters = between_voltages(fits, self.groups[group][0])
-                return peer.force(form, StrokeMotion.of(self.prepared[i]), parameters)
+                return peer.force(form, StrokeMotion.of(self.cleaned[i]), parameters)
 
             return predictor
 
@@ -235,8 +235,8 @@ class HeldOutTests:
         """Compute the error of predicted forces (n,) on the held-out samples of some records."""
         records, entries = list[int](), list[tuple[float, ...]]()
         for i in members:
-            kept = held_out[i] & comparable_samples(self.prepared[i])
-            force = self.prepared[i].record.force[kept]
+            kept = held_out[i] & comparable_samples(self.cleaned[i])
+            force = self.cleaned[i].record.force[kept]
             if force.any():
                 records.append(i)
                 entries.append((*squared_sums(force, force - predicted(i)[kept]), 0.0))
@@ -269,12 +269,12 @@ class BlackBox:
 
         def predictor(group: int, i: int) -> Array:
             weights = (np.interp(self.tests.groups[group][0], nodes, one) for one in np.eye(len(nodes)))
-            force = np.zeros(self.tests.prepared[i].record.time.size)
+            force = np.zeros(self.tests.cleaned[i].record.time.size)
             for node, weight in zip(nodes, weights, strict=True):
                 if weight > 0.0:
                     force += weight * self._free_run(order, fits[node].parameters, i)
                     if fits[node].status == UNSTABLE:
-                        self.unstable.add(self.tests.prepared[i].record.name)
+                        self.unstable.add(self.tests.cleaned[i].record.name)
             return force
 
         return predictor
@@ -291,11 +291,11 @@ class BlackBox:
     @cached_property
     def _orders(self) -> list[Order]:
         members = [i for _, group in self.tests.groups for i in group]
-        return narx.orders([StrokeMotion.of(self.tests.prepared[i]) for i in members])
+        return narx.orders([StrokeMotion.of(self.tests.cleaned[i]) for i in members])
 
     @cached_property
     def _bound(self) -> float:
-        forces = (self.tests.prepared[i].record.force for _, group in self.tests.groups for i in group)
+        forces = (self.tests.cleaned[i].record.force for _, group in self.tests.groups for i in group)
         return narx.BOUND * max(float(np.max(np.abs(force))) for force in forces)
 
     def _error_within(self, order: Order, folds: tuple[int, ...], groups: Sequence[int]) -> float:
@@ -315,7 +315,7 @@ class BlackBox:
         return PredictionError.concatenated(found).criterion or 0.0
 
     def _free_run(self, order: Order, coefficients: Array, i: int) -> Array:
-        p = self.tests.prepared[i]
+        p = self.tests.cleaned[i]
         return narx.free_run(order, coefficients, StrokeMotion.of(p), float(p.record.force[0]), self._bound)
 
     def _fit(self, order: Order, group: int, folds: tuple[int, ...]) -> PeerFit:
@@ -331,7 +331,7 @@ class BlackBox:
         if key not in self._factors:
             factors = []
             for i in self.tests.groups[group][1]:
-                p = self.tests.prepared[i]
+                p = self.tests.cleaned[i]
                 fitted = self.tests.folds.folds[fold][i] & comparable_samples(p)
                 factors.append(narx.triangle(order, StrokeMotion.of(p), p.record.force, fitted))
             self._factors[key] = narx.joined(factors)
@@ -365,8 +365,8 @@ def compare_with_peers(rig: Rig, identified: Identified, diagnosed: Diagnosed, s
         raise DataError(
             "pzd peers: too little to keep a test back at a constant control signal; record two or more at each"
         )
-    prepared = prepare(unsaturated_records(rig, setting)[0])
-    tests = HeldOutTests(prepared, assign_folds(prepared, base_of(identified.rows, setting)))
+    cleaned = clean(unsaturated_records(rig, setting)[0])
+    tests = HeldOutTests(cleaned, assign_folds(cleaned, base_of(identified.rows, setting)))
     black_box = BlackBox(tests)
     fitters: dict[str, Fitter] = {**{name: tests.law(peer) for name, peer in peers().items()}, narx.NAME: black_box}
     by_record = _by_record(tests, prediction.by)
@@ -432,7 +432,7 @@ def _rows(
     for voltage, group in tests.groups:
         for i in group:
             errors = {model: each.of_records([i]) for model, each in held_out.items()}
-            yield from rows("test", voltage, tests.prepared[i].record.name, errors)
+            yield from rows("test", voltage, tests.cleaned[i].record.name, errors)
     for voltage, group in tests.groups if controlled else ():
         yield from rows("test", voltage, None, {model: each.of_records(group) for model, each in held_out.items()})
     yield from rows("test", None, None, held_out)
@@ -511,7 +511,7 @@ def _by_record(tests: HeldOutTests, by: Sequence[HeldOutTest]) -> dict[int, Held
     found = {}
     for voltage, group in zip(tests.folds.voltages, tests.folds.groups, strict=True):
         for i in group:
-            mine = waiting.get(tests.prepared[i].record.name, [])
+            mine = waiting.get(tests.cleaned[i].record.name, [])
             if mine:
                 each = mine.pop(0)
                 if voltage is not None:

@@ -455,14 +455,14 @@ def interpolation_check(damper: Damper, validation: CrossValidation) -> bool:
 
 
 def _near_mean_force(damper: Damper, validation: CrossValidation, record: int, low: float, high: float) -> bool:
-    prepared = validation.campaign.prepared[record]
-    motion, samples = simulation_motion(prepared.record)
+    cleaned = validation.campaign.cleaned[record]
+    motion, samples = simulation_motion(cleaned.record)
 
     def force(voltage: float) -> Array:
         """Compute the force at another voltage, where it does not depend on how the test began."""
         fixed_voltage = replace(motion, voltage=np.full(motion.time.size, voltage))
-        found = respond(damper, fixed_voltage, float(prepared.record.force[0]), TOLERANCE)
-        return found[samples][comparable_samples(prepared)]
+        found = respond(damper, fixed_voltage, float(cleaned.record.force[0]), TOLERANCE)
+        return found[samples][comparable_samples(cleaned)]
 
     below, half_way, above = force(low), force(0.5 * (low + high)), force(high)
     off = rms(half_way - 0.5 * (below + above))

@@ -23,13 +23,14 @@ from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.adoption import Adoption, add_predictive_effects, adopt_effects, plain_unless_better
 from pzd.diagnosis.campaign import Campaign, nearest_row
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
-from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import polished
 from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples, shown_force
 from pzd.diagnosis.gap import ResidualCheck, gap_with_nuisances, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
+from pzd.diagnosis.roles import TRAINING
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
 from pzd.diagnosis.search.determination import first_undetermined, varying_strengths
@@ -461,10 +462,10 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
     damper : that they are compared with
     config : which probability is significant, and what is visible
     """
-    checks = [c for c in campaign.checks(damper) if c.prepared.constant and (c.wanted & c.calm).any()]
+    checks = [c for c in campaign.checks(damper) if c.cleaned.constant and (c.wanted & c.calm).any()]
     if not checks:
         return None
-    condition = np.array([nearest_row(damper.base, c.prepared) for c in checks])
+    condition = np.array([nearest_row(damper.base, c.cleaned) for c in checks])
     nuisances, forces = _test_nuisances(checks)
     pairs = [
         (name, follows, _within_condition_trend(nuisances[:, i], forces[:, i], over, condition))
@@ -489,7 +490,7 @@ def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
     found, forces = [], []
     for check in checks:
         at = check.wanted & check.calm
-        columns = nuisance_columns(check.predicted[at], check.prepared.record.rate, NUISANCE_UNITS, at)
+        columns = nuisance_columns(check.predicted[at], check.cleaned.record.rate, NUISANCE_UNITS, at)
         found.append(np.linalg.lstsq(columns, check.residual[at], rcond=None)[0])
         forces.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
     return np.array(found).reshape(-1, 3), np.array(forces).reshape(-1, 3)
@@ -497,8 +498,8 @@ def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
 
 def _motion_quantities(checks: Sequence[ResidualCheck]) -> Iterator[tuple[str, Array]]:
     """Yield by name the quantities (n,) in which tests differ; NaN where a test has none."""
-    records = [c.prepared.record for c in checks]
-    cycles = [c.prepared.cycles for c in checks]
+    records = [c.cleaned.record for c in checks]
+    cycles = [c.cleaned.cycles for c in checks]
     yield "frequency", np.log([np.nan if run is None else run.frequency for run in cycles])
     yield "speed", np.log([rms(r.velocity) for r in records])
     yield "stroke", np.log([float(np.ptp(r.displacement)) for r in records])
@@ -550,10 +551,10 @@ def _within_condition_trend(
 def insufficient_data(campaign: Campaign) -> bool:
     """Whether the records are too short for the search: nothing to weigh, or nothing to fit."""
     samples = campaign.seen, campaign.in_role(TRAINING)
-    return not all(any(map(enough_samples, campaign.prepared, masks)) for masks in samples)
+    return not all(any(map(enough_samples, campaign.cleaned, masks)) for masks in samples)
 
 
-def insufficient_data_diagnosis(recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope) -> Diagnosis:
+def insufficient_data_diagnosis(recorded: Sequence[CleanedRecord], envelope: OperatingEnvelope) -> Diagnosis:
     """Return the diagnosis of records that are too short: nothing is known, and a longer test is proposed.
 
     Parameters
@@ -651,8 +652,8 @@ def hold_out_note(hold_out: str) -> str:
 
 def alone_note(validation: CrossValidation) -> str:
     """Say where a test that is kept back leaves none at its temperature, so that the others do not know it."""
-    prepared = validation.campaign.prepared
-    rows = {i: nearest_row(validation.baseline.base, p) for i, p in enumerate(prepared) if p.constant}
+    cleaned = validation.campaign.cleaned
+    rows = {i: nearest_row(validation.baseline.base, p) for i, p in enumerate(cleaned) if p.constant}
     alone = sum([*rows.values()].count(row) == 1 and i not in validation.lone for i, row in rows.items())
     if not alone:
         return ""
@@ -680,17 +681,17 @@ show whether the damper bends there: a step passes in a hundredth, and a node th
 """
 
 
-def nodes_note(prepared: Sequence[PreparedRecord], base: Sequence[BaseRow], signal: str) -> str:
+def nodes_note(cleaned: Sequence[CleanedRecord], base: Sequence[BaseRow], signal: str) -> str:
     """Say that T0 and C are straight lines between few control signals, where some test moves and stays between these.
 
     Parameters
     ----------
-    prepared : the tests
+    cleaned : the tests
     base : rows of the damper
     signal : name of the control signal
     """
     levels = sorted({row.voltage_V for row in base if row.voltage_V is not None})
-    moves = [v for each in prepared if not each.constant and (v := each.record.voltage) is not None]
+    moves = [v for each in cleaned if not each.constant and (v := each.record.voltage) is not None]
     if not moves or len(levels) < 2:
         return ""
     scale = max(map(abs, (*levels, levels[-1] - levels[0])))

@@ -30,12 +30,20 @@ from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 from pzd.damper.fitted_laws import seal
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
-from pzd.diagnosis import data, next_test, thresholds
+from pzd.diagnosis import next_test, thresholds
 from pzd.diagnosis.adoption import Adoption, by_criterion_if_better
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.cleaned_records import (
+    CleanedRecord,
+    centred_on,
+    clean,
+    drift_note,
+    saturation_note,
+    unsaturated_records,
+    without_drift,
+)
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
-from pzd.diagnosis.data import TRAINING, PreparedRecord
 from pzd.diagnosis.fit.least_squares import base_half_widths, plain_fit, polished, refit, standard_errors
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, probability_of_noise, regions, visible_gap
@@ -43,6 +51,7 @@ from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.predictive_search import improves
+from pzd.diagnosis.roles import TRAINING, split
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import candidate, converged, has_name
 from pzd.diagnosis.search.determination import first_undetermined
@@ -158,16 +167,16 @@ def _searched(
     rows: tuple[ParameterRow, ...],
 ) -> _Searched:
     """Search beside the damper that identify found, with T0, C and k of each condition in rows."""
-    records, saturated = data.unsaturated_records(rig, setting)
-    records, drift = data.without_drift(rig, records)
-    recorded = data.prepare(records)
+    records, saturated = unsaturated_records(rig, setting)
+    records, drift = without_drift(rig, records)
+    recorded = clean(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
-    prepared = data.centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
-    roles = data.split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
+    cleaned = centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
+    roles = split(cleaned, identify.group.voltage_V, identify.group.temperature_degC)
     baseline = identified.about(zero).moved(-zero)
-    prepared = with_hum(prepared, baseline)
+    cleaned = with_hum(cleaned, baseline)
     budget, law = Budget(diagnose.most_evaluations), tuple(baseline.effects)
-    campaign = Campaign(prepared, roles, diagnose.nuisance, jobs, budget, law)
+    campaign = Campaign(cleaned, roles, diagnose.nuisance, jobs, budget, law)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
     envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
 
@@ -197,15 +206,15 @@ def _searched(
             hold_out_note(roles.hold_out),
             no_prediction_note(prediction),
             alone_note(validation),
-            data.saturation_note(saturated),
-            data.drift_note(drift),
+            saturation_note(saturated),
+            drift_note(drift),
         )
         handed_on = fitted_to_all(adoption, validation, diagnose.force)
         final = handed_on.fitted.damper.moved(zero) if selection.adopted else identified
         beside = "" if law else knee_note(identify.law, decision.verdict, baseline.base)
         beside += _seal_note(final, law)
         if decision.verdict == "unexplained" and identify.nodes is None:
-            beside += nodes_note(prepared, baseline.base, control.name)
+            beside += nodes_note(cleaned, baseline.base, control.name)
         if "end_stop" in selection.adopted:
             beside += one_stop_note(final, [each.record.displacement for each in recorded])
         if "temperature_drift" not in selection.adopted:
@@ -478,7 +487,7 @@ def _next_test(
     final: Damper,
     zero: float,
     validation: CrossValidation,
-    recorded: Sequence[PreparedRecord],
+    recorded: Sequence[CleanedRecord],
     envelope: OperatingEnvelope,
 ) -> NextTest | None:
     """Propose the test that separates rivals, or without rivals one at a voltage where the prediction is worst.

@@ -13,7 +13,7 @@ from pzd.damper.confounders import known, module_of
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import PreparedRecord, prepare
+from pzd.diagnosis.cleaned_records import CleanedRecord, clean
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.quantities import BINGHAM
 from pzd.record import Array, Record
@@ -70,9 +70,9 @@ class DamperModels:
         (n,) force of the baseline and (n,) of the final damper [N]
         """
         if record.name not in self._forces:
-            prepared = prepare((record,))
-            baseline = _force(self.diagnosed.baseline, record, prepared)
-            final = _force(self.diagnosed.damper, record, prepared) if self.extended else baseline
+            cleaned = clean((record,))
+            baseline = _force(self.diagnosed.baseline, record, cleaned)
+            final = _force(self.diagnosed.damper, record, cleaned) if self.extended else baseline
             self._forces[record.name] = (baseline, final)
         return self._forces[record.name]
 
@@ -93,10 +93,10 @@ class DamperModels:
         return " to ".join(dict.fromkeys(amount(end(forces), "N") for end in (min, max))) if any(forces) else ""
 
 
-def _force(damper: Damper, record: Record, prepared: Sequence[PreparedRecord]) -> Array:
-    """Compute the (n,) force of a damper in a record, as judged in its prepared parts [N]."""
+def _force(damper: Damper, record: Record, cleaned: Sequence[CleanedRecord]) -> Array:
+    """Compute the (n,) force of a damper in a record, as judged in its cleaned parts [N]."""
     force = respond(damper, Motion.of(record), float(record.force[0]))
-    for part in prepared:
+    for part in cleaned:
         first = int(np.argmin(np.abs(record.time - part.record.time[0])))
         force[first : first + part.record.time.size] = predicted_force(damper, part)
     return force

@@ -12,9 +12,10 @@ from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.roles import split
 from pzd.diagnosis.stage import diagnose
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
@@ -101,8 +102,8 @@ def sines(
 
 
 def campaign_of(records: Iterable[Record]) -> Campaign:
-    prepared = prepare(tuple(records))
-    return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
+    cleaned = clean(tuple(records))
+    return Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig())
 
 
 STAND = RigConfig(files=(FilesEntry(path="*.csv"),))

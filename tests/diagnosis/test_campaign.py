@@ -9,7 +9,8 @@ import pytest
 from synthetic import TWO, damper_of, diagnosed, sines
 
 from pzd.diagnosis.campaign import Campaign
-from pzd.diagnosis.data import HELD_OUT, prepare, split
+from pzd.diagnosis.cleaned_records import clean
+from pzd.diagnosis.roles import HELD_OUT, split
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -19,10 +20,10 @@ PLAIN = damper_of(TWO)
 @pytest.fixture
 def asked(rng: np.random.Generator) -> Callable[[int], Campaign]:
     """The same campaign, so many records at the same time."""
-    prepared = prepare(sines(PLAIN, rng, TWO, cycles=4))
+    cleaned = clean(sines(PLAIN, rng, TWO, cycles=4))
 
     def made(jobs: int) -> Campaign:
-        return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig(), jobs)
+        return Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig(), jobs)
 
     return made
 
@@ -35,13 +36,13 @@ def test_a_damper_is_checked_once(asked: Callable[[int], Campaign]) -> None:
 
 def test_the_search_sees_all_but_the_held_out_samples(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
-    seen = {j.prepared.record.name: j.wanted for j in campaign.checks(PLAIN)}
-    held_out = {j.prepared.record.name: j.wanted for j in campaign.held_out_checks(PLAIN)}
+    seen = {j.cleaned.record.name: j.wanted for j in campaign.checks(PLAIN)}
+    held_out = {j.cleaned.record.name: j.wanted for j in campaign.held_out_checks(PLAIN)}
     assert held_out
-    for prepared, roles in zip(campaign.prepared, campaign.split.roles, strict=True):
+    for cleaned, roles in zip(campaign.cleaned, campaign.split.roles, strict=True):
         nothing = np.zeros(roles.size, dtype=np.bool_)
-        assert not np.any(seen.get(prepared.record.name, nothing) & (roles == HELD_OUT))
-        assert not np.any(held_out.get(prepared.record.name, nothing) & (roles != HELD_OUT))
+        assert not np.any(seen.get(cleaned.record.name, nothing) & (roles == HELD_OUT))
+        assert not np.any(held_out.get(cleaned.record.name, nothing) & (roles != HELD_OUT))
 
 
 def test_parallel_checks_equal_serial_ones(asked: Callable[[int], Campaign]) -> None:

@@ -103,7 +103,7 @@ def test_a_voltage_is_known_by_its_rows_at_any_temperature(rng: np.random.Genera
     known = asked._predictable(plain.model_copy(update={"base": warm}), asked.folds[0])
     assert [mask.any() for mask in known] == [mask.any() for mask in asked.folds[0]]
     cold = plain.model_copy(update={"base": plain.base[:1]})
-    lost = [p.record.voltage is not None and p.record.voltage[0] > 75.0 for p in asked.campaign.prepared]
+    lost = [p.record.voltage is not None and p.record.voltage[0] > 75.0 for p in asked.campaign.cleaned]
     known = asked._predictable(cold, asked.folds[0])
     assert [mask.any() for mask in known] == [
         m.any() and not gone for m, gone in zip(asked.folds[0], lost, strict=True)
@@ -129,7 +129,7 @@ def test_the_one_test_that_slips_is_not_foretold_by_those_that_only_strain_the_o
     plain = damper_of((0.0, 150.0))
     tests = ((0.5, 0.0025), (1.0, 0.0025), (2.0, 0.0029), (1.0, 0.01))
     asked = validation(sines(plain, rng, (0.0, 150.0), tests=tests, cycles=4), plain)
-    *_, slipping = (i for i, p in enumerate(asked.campaign.prepared) if "150V" in p.record.name)
+    *_, slipping = (i for i, p in enumerate(asked.campaign.cleaned) if "150V" in p.record.name)
     assert asked.lone == {slipping}
     for each in asked.folds:
         assert not each[slipping].all()
@@ -240,9 +240,9 @@ def test_interpolation_is_much_worse_from_one_and_a_half_times_the_baseline_erro
 def test_every_sample_of_every_voltage_is_held_out_once(rng: np.random.Generator) -> None:
     asked = validation(sines(damper_of(), rng, tests=OTHER_TESTS, cycles=2), damper_of())
     assert asked.voltages == tuple(TABLE_2)
-    for i, prepared in enumerate(asked.campaign.prepared):
+    for i, cleaned in enumerate(asked.campaign.cleaned):
         kept_back = np.stack([fold[i] for fold in asked.folds])
-        assert np.all(kept_back.sum(axis=0) == 1), prepared.record.name
+        assert np.all(kept_back.sum(axis=0) == 1), cleaned.record.name
         assert kept_back.any(axis=1).sum() == 1
 
 

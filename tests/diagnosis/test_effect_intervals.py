@@ -12,10 +12,11 @@ from synthetic import all_but, damper_of, diagnosed, sine, sines
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
-from pzd.diagnosis.data import prepare, split
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.least_squares import FitResult, base_half_widths, fit, standard_errors
 from pzd.diagnosis.fit.problem import Unknown
 from pzd.diagnosis.fit.sensitivities import BlockJacobian
+from pzd.diagnosis.roles import split
 from pzd.fit.intervals import LEVEL, disagreement
 from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
@@ -94,9 +95,9 @@ def shown_late(
 
 def fitted_to(records: tuple[Record, ...], effects: dict[str, dict[str, float]]) -> tuple[Evidence, FitResult]:
     """Fitted from the truth, and weighed by what that leaves."""
-    damper, prepared = damper_of((0.0, 150.0), **effects), prepare(records)
+    damper, cleaned = damper_of((0.0, 150.0), **effects), clean(records)
     for _ in range(3):
-        evidence = evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper)
+        evidence = evidence_of(Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig()), damper)
         found = fit(evidence.whole, tuple(effects), evidence.whole.start_with(damper))
         damper = found.damper
     return evidence, found

@@ -18,10 +18,11 @@ from pzd.damper.model import BaseRow, Damper, against_nature
 from pzd.damper.motion import Motion
 from pzd.diagnosis import thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import FitResult, fit
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.roles import split
 from pzd.diagnosis.search import candidates as searching
 from pzd.diagnosis.search.acceptance import Selection, SelectionStep
 from pzd.diagnosis.search.candidates import Candidate, candidate, converged, resumed
@@ -225,8 +226,8 @@ def test_an_effect_that_is_not_searched_for_would_not_pay(
     hidden: str | None, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     effects = {} if hidden is None else {hidden: HIDDEN[hidden]}
-    prepared = prepare(sines(damper_of(TWO, **effects), rng, TWO, cycles=3))
-    whole = evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of(TWO)).whole
+    cleaned = clean(sines(damper_of(TWO, **effects), rng, TWO, cycles=3))
+    whole = evidence_of(Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig()), damper_of(TWO)).whole
     before = fit(whole, (), whole.start())
     screened = {c.effect: c for c in searching.candidates(whole, before)}
     monkeypatch.setattr(thresholds, "LEAST_DROP_IN_GAP", -np.inf)

@@ -15,8 +15,8 @@ from synthetic import TABLE_2, damper_of, sine
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import Split, prepare
 from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import (
     ResidualCheck,
@@ -27,6 +27,7 @@ from pzd.diagnosis.gap import (
     regions,
     visible_gap,
 )
+from pzd.diagnosis.roles import Split
 from pzd.diagnosis.search.acceptance import leaves_gap
 from pzd.record import Array, Record, sliced
 from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, split_at_gaps
@@ -80,9 +81,9 @@ def checked(
     true: Damper, assumed: Damper, rng: np.random.Generator, rate: float, cycles: float, frequency: float = 1.0
 ) -> ResidualCheck:
     record = sine(true, 0.0, frequency, 0.02, rng, noise=QUIET, colour=0.0, rate=rate, cycles=cycles)
-    (prepared,) = prepare([record])
-    given = predict(assumed, prepared, NuisanceConfig().delay_s)
-    return check_residual(given, prepared, np.ones(prepared.record.time.size, np.bool_), NuisanceConfig())
+    (cleaned,) = clean([record])
+    given = predict(assumed, cleaned, NuisanceConfig().delay_s)
+    return check_residual(given, cleaned, np.ones(cleaned.record.time.size, np.bool_), NuisanceConfig())
 
 
 def rigid(friction: float, **effects: dict[str, float]) -> Damper:
@@ -94,8 +95,8 @@ def test_octaves_hold_no_more_of_the_gap_than_the_tests_that_have_cycles(rng: np
     """Their noise was divided among octaves as if it were the gap, which lay in a motion that never repeats."""
     plain, turbulent = rigid(300.0), rigid(300.0, orifice_quadratic={"q": 5000.0})
     within, outside = checked(plain, plain, rng, 500.0, 8.0), checked(turbulent, plain, rng, 500.0, 1.9)
-    assert within.prepared.cycles is not None
-    assert outside.prepared.cycles is None
+    assert within.cleaned.cycles is not None
+    assert outside.cleaned.cycles is None
     octaves = [each.share_of_gap for each in regions([within, outside], "V") if each.region.endswith("Hz in the force")]
     assert sum(octaves) < 0.1
 
@@ -125,9 +126,9 @@ def test_what_a_gain_of_the_test_takes_stands_beside_the_noise(rng: np.random.Ge
     """Of a load cell that is off by a few per mill of a force: its square of the squares of the force."""
     true = rigid(300.0)
     record = sine(true, 0.0, 1.0, 0.02, rng, noise=QUIET, colour=0.0, rate=1000.0, cycles=8.0)
-    (prepared,) = prepare([replace(record, force=gain * record.force)])
-    given = predict(true, prepared, NuisanceConfig().delay_s)
-    judged = check_residual(given, prepared, np.ones(record.time.size, np.bool_), NuisanceConfig())
+    (cleaned,) = clean([replace(record, force=gain * record.force)])
+    given = predict(true, cleaned, NuisanceConfig().delay_s)
+    judged = check_residual(given, cleaned, np.ones(record.time.size, np.bool_), NuisanceConfig())
     gap = held_out_criterion([judged], NOBODY)
     load = np.sqrt(np.mean(record.force**2)) / np.max(np.abs(record.force))
     assert gap_with_nuisances([judged]) == pytest.approx(abs(1.0 - 1.0 / gain) * load, rel=0.05)
@@ -180,11 +181,11 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap(rng: 
     friction = {"F_s": 0.4 * TABLE_2[0.0][0], "v_s": 0.015}
     damper = damper_of((0.0,), stribeck_friction=friction)
     record = sine(damper, 0.0, 1.03, 0.03, rng, noise=0.005, rate=500.0)
-    (prepared,) = prepare((record,))
-    wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
-    with_jump, without = (predict(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
-    assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.002  # visible from 0.0025
-    assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01
+    (cleaned,) = clean((record,))
+    wanted = np.ones(cleaned.record.time.size, dtype=np.bool_)
+    with_jump, without = (predict(d, cleaned, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
+    assert visible_gap([check_residual(with_jump, cleaned, wanted, NuisanceConfig())]) < 0.002  # visible from 0.0025
+    assert visible_gap([check_residual(without, cleaned, wanted, NuisanceConfig())]) > 0.01
 
 
 def test_the_true_damper_in_a_motion_that_does_not_repeat_leaves_no_gap_at_its_jumps(rng: np.random.Generator) -> None:
@@ -199,13 +200,13 @@ def test_the_true_damper_in_a_motion_that_does_not_repeat_leaves_no_gap_at_its_j
     force = respond(damper, Motion(time, x, v, a, np.zeros(time.size)))
     force += 0.002 * np.max(force) * rng.standard_normal(time.size)
     fine = Record("two-tone", None, time, x, v, a, force, np.zeros(time.size))
-    (prepared,) = prepare((sliced(fine, np.arange(time.size) % 8 == 3),))
-    assert prepared.cycles is None
+    (cleaned,) = clean((sliced(fine, np.arange(time.size) % 8 == 3),))
+    assert cleaned.cycles is None
     assert np.count_nonzero(np.diff(np.sign(v))) > 80
     check = check_residual(
-        predict(damper, prepared, NuisanceConfig().delay_s),
-        prepared,
-        np.ones(prepared.record.time.size, dtype=np.bool_),
+        predict(damper, cleaned, NuisanceConfig().delay_s),
+        cleaned,
+        np.ones(cleaned.record.time.size, dtype=np.bool_),
         NuisanceConfig(),
     )
     assert check.probability["smooth"][0] > 1e-3
@@ -244,9 +245,9 @@ def late_sweep(
 
 def probability(record: Record, wanted: NDArray[np.bool_]) -> float:
     """That noise alone leaves what the true damper leaves of the wanted samples."""
-    (prepared,) = prepare((record,))
+    (cleaned,) = clean((record,))
     config = NuisanceConfig()
-    found = check_residual(predict(DAMPER, prepared, config.delay_s), prepared, wanted, config)
+    found = check_residual(predict(DAMPER, cleaned, config.delay_s), cleaned, wanted, config)
     return float(np.min(found.probability["smooth"]))
 
 
@@ -285,9 +286,9 @@ def test_a_flank_of_few_samples_that_comes_late_is_no_gap_though_the_voltage_ste
             BaseRow(voltage_V=150.0, T0_N=305.0, C_Ns_per_m=6.0, k_N_per_m=5.9e6),
         )
     )
-    (prepared,) = prepare((late_sweep(switching(0.4), rng, stiff, late=0.0012, noise=1.5),))
-    everything, config = np.ones(prepared.record.time.size, dtype=np.bool_), NuisanceConfig()
-    check = check_residual(predict(stiff, prepared, config.delay_s), prepared, everything, config)
+    (cleaned,) = clean((late_sweep(switching(0.4), rng, stiff, late=0.0012, noise=1.5),))
+    everything, config = np.ones(cleaned.record.time.size, dtype=np.bool_), NuisanceConfig()
+    check = check_residual(predict(stiff, cleaned, config.delay_s), cleaned, everything, config)
     assert visible_gap([check]) < 0.0005
 
 

@@ -15,8 +15,8 @@ from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.cross_validation import cross_validation_of
-from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import (
     MarginalisedNuisances,
@@ -26,14 +26,15 @@ from pzd.diagnosis.fit.likelihood import (
     weighted_record,
 )
 from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
+from pzd.diagnosis.roles import HELD_OUT, TRAINING, VALIDATION, split
 from pzd.diagnosis.search.candidates import candidate
 from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
 
 
 def evidence(records: tuple[Record, ...], damper: Damper) -> Evidence:
-    prepared = prepare(records)
-    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper)
+    cleaned = clean(records)
+    return evidence_of(Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig()), damper)
 
 
 @pytest.mark.parametrize(
@@ -66,13 +67,13 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
     k, noise, shares = 2e5, 2e-5, []
     stuck = Damper(base=(BaseRow(voltage_V=0.0, T0_N=1e6, C_Ns_per_m=3000.0, k_N_per_m=k),))
     for _ in range(20):
-        (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
-        run = prepared.cycles
+        (cleaned,) = clean((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
+        run = cleaned.cycles
         assert run is not None
-        variance = predict(stuck, prepared, 0.0).shared_variance
+        variance = predict(stuck, cleaned, 0.0).shared_variance
         assert isinstance(variance, np.ndarray)
         assert variance[0] == 0.0
-        single = noise**2 / run.points(prepared.record.time) / run.count
+        single = noise**2 / run.points(cleaned.record.time) / run.count
         # An average over harmonics 0 to 3, of which one is kept.
         shares.append(4.0 * variance[1] / (k**2 * single))
     # Never half as unsure as it must be: of 400 draws the smallest is 0.68. What noise lets through besides makes the
@@ -96,14 +97,14 @@ def test_a_delay_of_all_tests_and_one_of_a_test_shift_the_force_in_one(rng: np.r
 
 
 def test_the_instant_of_a_standing_voltage_does_not_matter(rng: np.random.Generator) -> None:
-    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
-    assert predict(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
+    (cleaned,) = clean((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
+    assert predict(damper_of(TWO), cleaned, 5e-4).timing.shape == (cleaned.record.time.size, 0)
 
 
 def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, stribeck_friction={"F_s": 200.0, "v_s": 0.04})
-    (prepared,) = prepare((sine(truth, 0.0, 1.0, 0.02, rng, noise=0.002),))
-    made = evidence((prepared.record, sine(truth, 150.0, 1.0, 0.02, rng)), truth)
+    (cleaned,) = clean((sine(truth, 0.0, 1.0, 0.02, rng, noise=0.002),))
+    made = evidence((cleaned.record, sine(truth, 150.0, 1.0, 0.02, rng)), truth)
     one = made.whole.observations[0]
     bend = np.abs(np.convolve(one.measured, (1.0, -2.0, 1.0), "same"))
     bend[[0, -1]] = 0.0
@@ -167,9 +168,9 @@ def test_nor_is_it_a_sample_s_where_nothing_repeats(
 
 
 def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Generator) -> None:
-    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
-    voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
-    stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
+    (cleaned,) = clean((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
+    voltage = np.where(np.arange(cleaned.record.time.size) < 3000, 0.0, 150.0)
+    stepped = replace(cleaned, record=replace(cleaned.record, voltage=voltage), lead=None, cycles=None)
     before, after = 2999, 3000
     reach = round(NEAR_STEP * stepped.record.rate)
     assert reach >= 1
@@ -178,10 +179,10 @@ def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Gene
 
 
 def test_the_most_demanding_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> None:
-    prepared = prepare(sines(damper_of(), rng, cycles=4))
-    roles = split(prepared, None, 2.0).roles
+    cleaned = clean(sines(damper_of(), rng, cycles=4))
+    roles = split(cleaned, None, 2.0).roles
     for channel in ("force", "velocity", "displacement"):
-        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
+        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in cleaned]
         assert roles[int(np.argmax(peaks))][0] == TRAINING
 
 
@@ -228,7 +229,7 @@ def test_no_sample_has_two_roles(rng: np.random.Generator, count: int) -> None:
     }
     assert not compared[TRAINING] & compared[VALIDATION]
     assert compared[TRAINING] | compared[VALIDATION] == compared[TRAINING, VALIDATION]
-    roles = dict(zip((p.record.name for p in found.campaign.prepared), found.campaign.split.roles, strict=True))
+    roles = dict(zip((p.record.name for p in found.campaign.cleaned), found.campaign.split.roles, strict=True))
     for part, samples in compared.items():
         wanted = part if isinstance(part, tuple) else (part,)
         assert samples
@@ -329,10 +330,10 @@ def test_a_seal_that_turns_between_two_samples_leaves_the_true_damper_what_noise
     fine = sine(true, 0.0, 5.56, 0.02, rng, noise=0.0015, colour=0.0, rate=5000.0)
     for first in range(10):
         record = sliced(fine, np.arange(fine.time.size) % 10 == first)
-        (prepared,) = prepare([record])
-        everything = np.ones(prepared.record.time.size, dtype=np.bool_)
-        given = predict(true, prepared, 5e-4)
-        observed = weighted_record(prepared, everything, 0, given, NuisanceConfig())
+        (cleaned,) = clean([record])
+        everything = np.ones(cleaned.record.time.size, dtype=np.bool_)
+        given = predict(true, cleaned, 5e-4)
+        observed = weighted_record(cleaned, everything, 0, given, NuisanceConfig())
         assert observed is not None
         force, sensors = prompt_force(observed, true)
         left = observed.residual_and_slopes(force, np.zeros((force.size, 0)), sensors)[:, 0]

@@ -32,7 +32,7 @@ def sines_in_step(rng: np.random.Generator, amplitude: float) -> list[Record]:
 
 
 def allowing_for_hum(campaign: Campaign) -> Campaign:
-    return replace(campaign, prepared=with_hum(campaign.prepared, TRUE), _predictions={}, _checks={})
+    return replace(campaign, cleaned=with_hum(campaign.cleaned, TRUE), _predictions={}, _checks={})
 
 
 def test_the_true_damper_leaves_no_more_than_noise_of_sines_in_step_with_the_mains(rng: np.random.Generator) -> None:
@@ -52,4 +52,4 @@ def test_the_likelihood_gives_no_weight_to_a_harmonic_that_hums(rng: np.random.G
 
 def test_tests_without_hum_are_weighed_as_they_were(rng: np.random.Generator) -> None:
     campaign = campaign_of(sines_in_step(rng, 0.0))
-    assert all(np.all(each.hum_variance == 0.0) for each in with_hum(campaign.prepared, TRUE))
+    assert all(np.all(each.hum_variance == 0.0) for each in with_hum(campaign.cleaned, TRUE))

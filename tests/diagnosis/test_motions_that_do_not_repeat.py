@@ -16,7 +16,7 @@ from synthetic import diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import prepare
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.prediction import END_SHARE, comparable_samples
 from pzd.record import Array, Record
 from pzd.signals.cycles import cycles
@@ -121,7 +121,7 @@ def test_what_is_hidden_is_named_with_its_size(motion: str, effect: str, rng: Ge
 def test_noise_of_a_voltage_that_stands_still_is_no_step(rng: Generator) -> None:
     """Samples beside a step of the voltage are left out; noise once passed for steps, and left a tenth of them."""
     inside = 1.0 - 2.0 * END_SHARE
-    for each in prepare(records(PLAIN, MOTIONS["a sweep"], rng)):
+    for each in clean(records(PLAIN, MOTIONS["a sweep"], rng)):
         assert np.mean(comparable_samples(each)) == pytest.approx(inside, abs=0.02)
 
 

@@ -14,7 +14,7 @@ from pzd.artefacts.rig import Finding, RecordEntry
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import saturation_note, unsaturated_records
+from pzd.diagnosis.cleaned_records import saturation_note, unsaturated_records
 from pzd.record import Record
 from pzd.rig.config import Limits
 from pzd.rig.preflight import PreflightRecord, examined

@@ -10,8 +10,8 @@ import pytest
 from synthetic import TWO, damper_of, sine, sines, waveform
 
 from pzd.diagnosis import narx
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.cross_validation import assign_folds
-from pzd.diagnosis.data import prepare
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.narx import Order
 from pzd.diagnosis.peer_comparison import UNSTABLE, BlackBox, HeldOutTests
@@ -148,8 +148,8 @@ def test_a_held_out_half_is_neither_fitted_nor_anybody_s_past() -> None:
 
 
 def held_out_tests(records: Sequence[Record], voltages: Sequence[float] = TWO) -> HeldOutTests:
-    prepared = prepare(records)
-    return HeldOutTests(prepared, assign_folds(prepared, damper_of(voltages)))
+    cleaned = clean(records)
+    return HeldOutTests(cleaned, assign_folds(cleaned, damper_of(voltages)))
 
 
 def arx_records(at: dict[float, Array], rng: np.random.Generator) -> list[Record]:
@@ -207,7 +207,7 @@ def test_where_nothing_is_missing_no_black_box_predicts_better_than_the_damper(r
     error = tests.held_out_error(BlackBox(tests))
     true = PredictionError.concatenated(
         [
-            tests.error(tests.all_samples, members, lambda i: predicted_force(damper, tests.prepared[i]))
+            tests.error(tests.all_samples, members, lambda i: predicted_force(damper, tests.cleaned[i]))
             for _, members in tests.groups
         ]
     )

@@ -13,8 +13,8 @@ from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.cleaned_records import CleanedRecord, clean
 from pzd.diagnosis.cross_validation import cross_validation_of
-from pzd.diagnosis.data import PreparedRecord, prepare
 from pzd.diagnosis.next_test import (
     RECORDED_ERROR,
     STROKES,
@@ -100,8 +100,8 @@ def sine(frequency: float, amplitude: float, middle: float = 0.0, force: Callabl
     )  # fmt: skip
 
 
-def extremes(prepared: tuple[PreparedRecord, ...], channel: str) -> tuple[float, float]:
-    values = [getattr(p.record, channel) for p in prepared]
+def extremes(cleaned: tuple[CleanedRecord, ...], channel: str) -> tuple[float, float]:
+    values = [getattr(p.record, channel) for p in cleaned]
     return min(float(v.min()) for v in values), max(float(v.max()) for v in values)
 
 
@@ -125,8 +125,8 @@ def moved(told: NextTest) -> Motion:
 
 def test_a_damper_measured_off_zero_is_moved_within_its_stroke() -> None:
     """12.7 to 50 mm were recorded: 37.3 mm of stroke, not 100."""
-    prepared = prepare((sine(2.0, 0.01865, 0.03135), sine(1.0, 0.01, 0.03135)))
-    envelope = operating_envelope(Limits(), prepared, ())
+    cleaned = clean((sine(2.0, 0.01865, 0.03135), sine(1.0, 0.01, 0.03135)))
+    envelope = operating_envelope(Limits(), cleaned, ())
     assert envelope.middle == pytest.approx(0.03135, abs=2e-5)
     assert envelope.amplitude == pytest.approx(0.01865, abs=2e-5)
     assert envelope.frequency == pytest.approx(2.0, rel=1.1e-3)
@@ -148,20 +148,20 @@ def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force(rng:
                  lambda x, v: size * (ALIKE_AT_1_HZ * x + 10.0 * v))  # noqa: B023  # used inside the turn
             for _ in range(3)
         )  # fmt: skip
-        prepared = prepare(records)
-        told = separating_test(RIVALS, operating_envelope(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * middle, 0.0))
+        cleaned = clean(records)
+        told = separating_test(RIVALS, operating_envelope(Limits(), cleaned, ()), None, (-ALIKE_AT_1_HZ * middle, 0.0))
         if told is None:
             continue
         proposals += 1
         motion = moved(told)
-        lowest, highest = extremes(prepared, "displacement")
+        lowest, highest = extremes(cleaned, "displacement")
         room = RECORDED_ERROR * (highest - lowest)
         assert lowest - room <= motion.displacement.min(), records
         assert motion.displacement.max() <= highest + room, records
         speed = float(np.max(np.abs(motion.velocity)))
-        assert speed <= (1.0 + RECORDED_ERROR) * max(map(abs, extremes(prepared, "velocity"))), records
+        assert speed <= (1.0 + RECORDED_ERROR) * max(map(abs, extremes(cleaned, "velocity"))), records
         assert told.peak_speed_m_per_s == pytest.approx(speed, rel=1e-3)
-        low, high = extremes(prepared, "force")
+        low, high = extremes(cleaned, "force")
         for (_, damper), offset in zip(RIVALS, (-ALIKE_AT_1_HZ * middle, 0.0), strict=True):
             force = respond(damper, motion)[2000:] + offset
             scratch = 1e-3 * (high - low)  # of the sampling
@@ -175,8 +175,8 @@ def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force(rng:
 def test_the_zero_of_the_displacement_moves_the_middle_of_the_test_and_nothing_else() -> None:
     told = []
     for shift in (0.0, 0.05, -0.1):
-        prepared = prepare((sine(2.0, 0.0183, shift), sine(0.7, 0.03, shift + 0.003)))
-        found = separating_test(RIVALS, operating_envelope(Limits(), prepared, ()), None, (-ALIKE_AT_1_HZ * shift, 0.0))
+        cleaned = clean((sine(2.0, 0.0183, shift), sine(0.7, 0.03, shift + 0.003)))
+        found = separating_test(RIVALS, operating_envelope(Limits(), cleaned, ()), None, (-ALIKE_AT_1_HZ * shift, 0.0))
         assert found is not None
         assert found.middle_m == pytest.approx(shift + 0.003, abs=2e-5)
         told.append(found.model_copy(update={"middle_m": None, "peak_force_N": None, "peak_speed_m_per_s": None}))
@@ -184,13 +184,13 @@ def test_the_zero_of_the_displacement_moves_the_middle_of_the_test_and_nothing_e
 
 
 def test_limits_rule_where_they_are_given_a_stroke_about_the_recorded_middle() -> None:
-    prepared = prepare((sine(2.0, 0.01, 0.03, voltage=0.0), sine(2.0, 0.01, 0.03, voltage=100.0)))
-    assert operating_envelope(Limits(), prepared, (0.0, 100.0, 150.0)).voltages == pytest.approx((0.0, 100.0))
+    cleaned = clean((sine(2.0, 0.01, 0.03, voltage=0.0), sine(2.0, 0.01, 0.03, voltage=100.0)))
+    assert operating_envelope(Limits(), cleaned, (0.0, 100.0, 150.0)).voltages == pytest.approx((0.0, 100.0))
     wide = Limits(stroke_m=0.1, speed_m_per_s=3.0, force_N=5e4, frequency_Hz=20.0, voltage_V=(-10.0, 200.0))
-    envelope = operating_envelope(wide, prepared, (0.0, 150.0))
+    envelope = operating_envelope(wide, cleaned, (0.0, 150.0))
     assert replace(envelope, middle=0.0) == OperatingEnvelope(0.0, 0.05, 3.0, 20.0, (-5e4, 5e4), (0.0, 150.0))
     assert envelope.middle == pytest.approx(0.03, abs=1e-4)
-    assert operating_envelope(Limits(stroke_m=0.004), prepared, ()).amplitude == pytest.approx(0.002)
+    assert operating_envelope(Limits(stroke_m=0.004), cleaned, ()).amplitude == pytest.approx(0.002)
 
 
 def test_an_amplitude_is_rounded_down_and_never_beyond() -> None:
@@ -216,10 +216,10 @@ def test_a_recorded_sine_of_round_stroke_and_frequency_is_proposed_as_it_is(samp
     v = 0.01 * 4.0 * np.pi * np.cos(4.0 * np.pi * time)
     record = Record("r", None, time, x, v, -((4.0 * np.pi) ** 2) * x, 900.0 * v)
     assert 0.5 * np.ptp(x) < 0.01
-    envelope = operating_envelope(Limits(), prepare([record]), ())
+    envelope = operating_envelope(Limits(), clean([record]), ())
     assert (rounded_down(envelope.amplitude), rounded_down(envelope.frequency)) == (0.01, 2.0)
     assert 0.01 * 4.0 * np.pi <= envelope.speed <= 0.01 * 4.0 * np.pi * 1.005
-    limited = operating_envelope(Limits(stroke_m=0.01998, speed_m_per_s=0.1, frequency_Hz=1.999), prepare([record]), ())
+    limited = operating_envelope(Limits(stroke_m=0.01998, speed_m_per_s=0.1, frequency_Hz=1.999), clean([record]), ())
     assert (limited.amplitude, limited.speed, limited.frequency) == (0.00999, 0.1, 1.999)
 
 
@@ -249,8 +249,8 @@ def asked(damper: Damper, rng: np.random.Generator, limits: Limits = LIMITS) -> 
     campaign = campaign_of(records)
     validation = cross_validation_of(campaign, damper, 0.0025)
     errors = validation.baseline_error(), validation.baseline_interpolation_error
-    envelope = operating_envelope(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
-    return intermediate_voltage_test(damper, 0.0, errors, validation, campaign.prepared, envelope, None)
+    envelope = operating_envelope(limits, campaign.cleaned, [row.voltage_V or 0.0 for row in damper.base])
+    return intermediate_voltage_test(damper, 0.0, errors, validation, campaign.cleaned, envelope, None)
 
 
 @pytest.mark.parametrize("T0", [0.6 * ON_THE_LINE, 1.5 * ON_THE_LINE])
@@ -289,9 +289,9 @@ def test_stroke_and_speed_stay_within_the_limits_of_the_stand(rng: np.random.Gen
 def test_one_more_test_is_another_than_was_run(rng: np.random.Generator) -> None:
     damper, tests = damper_of(THREE), ((0.5, 0.02), (1.0, 0.01))
     records = sines(damper, rng, THREE, tests=tests, cycles=4)
-    envelope = operating_envelope(LIMITS, prepare(records), THREE)
+    envelope = operating_envelope(LIMITS, clean(records), THREE)
     asked = []
-    while (plan := repeated_longest_test(prepare(records), envelope)) is not None:
+    while (plan := repeated_longest_test(clean(records), envelope)) is not None:
         asked.append((plan.frequency_Hz, plan.amplitude_m, plan.voltage_V))
         assert isinstance(plan.voltage_V, float)
         assert plan.frequency_Hz is not None
@@ -304,14 +304,14 @@ def test_one_more_test_is_another_than_was_run(rng: np.random.Generator) -> None
 def test_a_test_at_rest_is_no_stroke_to_repeat(rng: np.random.Generator) -> None:
     records = sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4)
     rest = replace(records[0], name="rest", time=20.0 * records[0].time, displacement=1e-4 * records[0].displacement)
-    tests = prepare((rest, *records))
+    tests = clean((rest, *records))
     plan = repeated_longest_test(tests, operating_envelope(LIMITS, tests, THREE))
     assert plan is not None
     assert plan.amplitude_m == pytest.approx(0.02, rel=0.1)
 
 
 def test_a_lag_beside_a_hysteresis_asks_for_a_control_signal_that_steps(rng: np.random.Generator) -> None:
-    records = prepare(sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4))
+    records = clean(sines(damper_of(THREE), rng, THREE, tests=((0.5, 0.02),), cycles=4))
     envelope, names = operating_envelope(LIMITS, records, THREE), ("valve_lag", "piezo_hysteresis")
     plan = repeated_longest_test(records, envelope, names)
     assert plan is not None

@@ -15,11 +15,12 @@ from pzd.damper.effects.bouc_wen import hysteresis_after
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import assign_folds, cross_validation_of
-from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.peer_comparison import HeldOutTests, PeerData, PeerFit, between_voltages, fit_peer
 from pzd.diagnosis.peers import Peer, PeerForm, StrokeMotion, peers
+from pzd.diagnosis.roles import split
 from pzd.fit.cross_validation import PredictionError
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -124,8 +125,8 @@ def test_parameters_are_linear_between_voltages_and_constant_beyond() -> None:
 
 
 def kept_back_tests(records: Sequence[Record], voltages: Sequence[float] = TWO) -> HeldOutTests:
-    prepared = prepare(records)
-    return HeldOutTests(prepared, assign_folds(prepared, damper_of(voltages)))
+    cleaned = clean(records)
+    return HeldOutTests(cleaned, assign_folds(cleaned, damper_of(voltages)))
 
 
 def test_no_peer_is_fitted_to_a_held_out_test(rng: np.random.Generator) -> None:
@@ -179,20 +180,20 @@ def test_the_samples_compared_are_those_of_the_diagnosis(rng: np.random.Generato
     damper = damper_of(TWO, preload_offset={"F_0": 80.0})
     records = [sine(damper, U, f, x, rng, cycles=3, rate=200.0) for U in TWO for f, x in TESTS]
     records.append(irregular(damper, TWO[0]))
-    prepared, plain = prepare(records), damper_of(TWO)
-    campaign = Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
+    cleaned, plain = clean(records), damper_of(TWO)
+    campaign = Campaign(cleaned, split(cleaned, None, 2.0), NuisanceConfig())
     validation = cross_validation_of(campaign, plain, DiagnoseConfig().visible)
     missed = validation.baseline_error()
     prediction = validation.prediction(missed, missed, validation.baseline_interpolation_error)
     assert prediction is not None
     W_s = {each.record: each.W_s_plain for each in prediction.by}
     R2 = {each.record: each.R2_plain for each in prediction.by}
-    tests = HeldOutTests(prepared, assign_folds(prepared, plain))
-    assert any(p.lead is None for p in prepared)
-    known = tests.known_error({i: W_s[p.record.name] for i, p in enumerate(prepared)})
+    tests = HeldOutTests(cleaned, assign_folds(cleaned, plain))
+    assert any(p.lead is None for p in cleaned)
+    known = tests.known_error({i: W_s[p.record.name] for i, p in enumerate(cleaned)})
     assert known.criterion == pytest.approx(prediction.W_s_plain, rel=1e-9)
-    assert [known.of_records([i]).determination for i in range(len(prepared))] == pytest.approx(
-        [R2[p.record.name] for p in prepared], rel=1e-9
+    assert [known.of_records([i]).determination for i in range(len(cleaned))] == pytest.approx(
+        [R2[p.record.name] for p in cleaned], rel=1e-9
     )
 
 

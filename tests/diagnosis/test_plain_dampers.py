@@ -12,8 +12,8 @@ from synthetic import STAND
 
 from pzd.artefacts import Diagnosed, ParameterRow, Rig
 from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import prepare
 from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import check_residual
 from pzd.diagnosis.stage import diagnose
@@ -126,11 +126,11 @@ def test_a_reversal_between_two_samples_is_no_effect(T0: float, rng: Generator) 
 def test_coarse_steps_of_a_displacement_that_does_not_repeat_for_them_are_no_gap(rng: Generator) -> None:
     """A stroke of 7 mm read in 200 steps, on a stiff damper."""
     made = record_of(810.0, 904.0, 1.06e7, (1.97, 0.0035), 12.0 * rng.standard_normal(10001), 5000.0)
-    (prepared,) = prepare((replace(made, displacement=3.47e-5 * np.round(made.displacement / 3.47e-5)),))
-    assert prepared.cycles is None
+    (cleaned,) = clean((replace(made, displacement=3.47e-5 * np.round(made.displacement / 3.47e-5)),))
+    assert cleaned.cycles is None
     plain = Damper(base=(BaseRow(T0_N=810.0, C_Ns_per_m=904.0, k_N_per_m=1.06e7),))
-    wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
-    check = check_residual(predict(plain, prepared, 5e-4), prepared, wanted, NuisanceConfig())
+    wanted = np.ones(cleaned.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(plain, cleaned, 5e-4), cleaned, wanted, NuisanceConfig())
     assert check.probability["smooth"][0] > 1e-3
 
 

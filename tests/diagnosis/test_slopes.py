@@ -15,11 +15,11 @@ from pzd.damper.compose import respond, sensors_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, evidence_of
-from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, prompt_force, shown_force
 from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.fit.sensitivities import linearise
+from pzd.diagnosis.roles import split
 from pzd.record import Array, Record
 from pzd.signals.kinematics import kinematics
 from pzd.signals.nuisance import NuisanceConfig
@@ -36,7 +36,7 @@ def two_tones(damper: Damper, tones: Sequence[tuple[float, float]], rng: Generat
     volts = np.zeros(t.size)
     force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts))
     measured = force + 5.0 * rng.standard_normal(t.size)
-    tests = prepare((Record("two tones", None, t, x, clean.velocity, clean.acceleration, measured, volts),))
+    tests = clean((Record("two tones", None, t, x, clean.velocity, clean.acceleration, measured, volts),))
     return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole
 
 
@@ -70,7 +70,7 @@ def whole(effects: dict[str, dict[str, float]], rng: Generator, *, moving: bool)
     force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts, warmth))
     measured = force + 5.0 * rng.standard_normal(t.size)
     record = Record("test", None, t, x, clean.velocity, clean.acceleration, measured, volts, warmth)
-    tests = prepare((record,))
+    tests = clean((record,))
     return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole, damper
 
 

@@ -17,9 +17,10 @@ from pzd.damper.compose import respond
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import check_residual
+from pzd.diagnosis.roles import HELD_OUT, TRAINING, VALIDATION, split
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.workflow import parameters_of
 from pzd.identification.config import IdentifyConfig
@@ -148,13 +149,13 @@ def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(rng: np.random.Gen
 
 
 def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Generator) -> None:
-    prepared = prepare(sines(damper_of(), rng, cycles=4))
-    parts = split(prepared, None, 2.0)
+    cleaned = clean(sines(damper_of(), rng, cycles=4))
+    parts = split(cleaned, None, 2.0)
     whole = [int(roles[0]) for roles in parts.roles]
     assert all(np.all(roles == role) for roles, role in zip(parts.roles, whole, strict=True))
     assert [whole.count(role) for role in (TRAINING, VALIDATION, HELD_OUT)] == [8, 4, 4]
     kinds = [
-        (round(p.cycles.frequency, 2), round(float(np.ptp(p.record.displacement)), 3)) for p in prepared if p.cycles
+        (round(p.cycles.frequency, 2), round(float(np.ptp(p.record.displacement)), 3)) for p in cleaned if p.cycles
     ]
     for role in (TRAINING, VALIDATION, HELD_OUT):
         # The rig's hardest test is always fitted, so one kind may be missing elsewhere.
@@ -166,8 +167,8 @@ def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Ge
 
 
 def test_two_records_of_a_condition_hold_one_out_whole(rng: np.random.Generator) -> None:
-    prepared = prepare(sines(damper_of(TWO), rng, TWO, tests=((0.5, 0.03), (2.0, 0.03))))
-    parts = split(prepared, None, 2.0)
+    cleaned = clean(sines(damper_of(TWO), rng, TWO, tests=((0.5, 0.03), (2.0, 0.03))))
+    parts = split(cleaned, None, 2.0)
     assert parts.hold_out == "records"
     assert sorted(np.unique(roles).tolist() for roles in parts.roles) == [[0, 1], [0, 1], [2], [2]]
 
@@ -176,10 +177,10 @@ def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap(rng: np.
     damper = damper_of([0.0])
     for offset, gain, share in ((0.005, 1.03, 0.05), (0.05, 1.0, 0.5)):
         record = sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-4, offset=offset, gain=gain)
-        (prepared,) = prepare([record])
-        everything = np.ones(prepared.record.time.size, dtype=np.bool_)
+        (cleaned,) = clean([record])
+        everything = np.ones(cleaned.record.time.size, dtype=np.bool_)
         judged = check_residual(
-            predict(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
+            predict(damper, cleaned, NuisanceConfig().delay_s), cleaned, everything, NuisanceConfig()
         )
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share
@@ -202,10 +203,10 @@ def test_cleaned_displacement_keeps_the_corners_of_a_triangle(rng: np.random.Gen
     triangle = 0.02 * sum(np.cos(2 * np.pi * h * t) / h**2 for h in harmonics)
     zero = np.zeros(t.size)
     noisy = triangle + 1e-4 * rng.standard_normal(t.size)
-    (prepared,) = prepare([Record("t", None, t, noisy, zero, zero, zero)])
-    true = replace(prepared.record, displacement=np.interp(prepared.record.time, t, triangle))
-    error = prepared.record.displacement - true.displacement
-    assert prepared.cycles is not None
+    (cleaned,) = clean([Record("t", None, t, noisy, zero, zero, zero)])
+    true = replace(cleaned.record, displacement=np.interp(cleaned.record.time, t, triangle))
+    error = cleaned.record.displacement - true.displacement
+    assert cleaned.cycles is not None
     assert np.sqrt(np.mean(error**2)) < 3e-5
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis import data
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.cleaned_records import centred_on, clean
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.likelihood import WeightedRecord, shown_force
 from pzd.diagnosis.fit.problem import Budget
+from pzd.diagnosis.roles import split
 from pzd.record import mid_stroke
 from tests.studies.plain_study import SEED, Case, drawn, judged, rig_of
 
@@ -41,10 +42,10 @@ def weighed(case: Case, seed: int) -> Weighed:
             for value, d in zip(levels, case.dampers, strict=True)
         )
     )
-    recorded = data.prepare(rig_of(case, seed).records)
-    prepared = data.centred_on(recorded, mid_stroke(p.record.displacement for p in recorded))
-    roles = data.split(prepared, None, 5.0)
-    campaign = Campaign(prepared, roles, DiagnoseConfig().nuisance, 1, Budget(np.inf))
+    recorded = clean(rig_of(case, seed).records)
+    cleaned = centred_on(recorded, mid_stroke(p.record.displacement for p in recorded))
+    roles = split(cleaned, None, 5.0)
+    campaign = Campaign(cleaned, roles, DiagnoseConfig().nuisance, 1, Budget(np.inf))
     return Weighed(true, campaign, evidence_of(campaign, true))
 
 
@@ -118,7 +119,7 @@ def test_a_late_test_of_a_rigid_damper_is_found_over_the_whole_range() -> None:
 def test_tests_that_the_steps_of_a_channel_misread_alike_know_no_more_than_one() -> None:
     """Three levels in one motion: the same rounded samples three times."""
     case = drawn(SEED, 600)[72]
-    alike = data.prepare(rig_of(case, SEED).records)[:3]
+    alike = clean(rig_of(case, SEED).records)[:3]
     assert [p.read_alike for p in alike] == [3, 3, 3]
 
 

@@ -18,8 +18,8 @@ from synthetic import TABLE_2, TWO, all_but, campaign_of, damper_of, diagnosed, 
 from pzd.artefacts.diagnosis import Support, Verdict
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.adoption import Adoption
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import shown_force
 from pzd.diagnosis.fit.problem import Problem
@@ -513,9 +513,9 @@ def test_nodes_between_those_that_were_tested_are_advised_where_the_voltage_move
     """T0 that bends between two levels is no missing effect, and no test at a constant level shows it."""
     base = [BaseRow(voltage_V=U, T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6) for U in (0.0, 50.0, 150.0)]
 
-    def test(voltage: Array) -> PreparedRecord:
+    def test(voltage: Array) -> CleanedRecord:
         record = SimpleNamespace(voltage=voltage)
-        return cast("PreparedRecord", SimpleNamespace(constant=not np.ptp(voltage), record=record))
+        return cast("CleanedRecord", SimpleNamespace(constant=not np.ptp(voltage), record=record))
 
     constant, ramp = test(np.full(100, 50.0)), test(np.linspace(0.0, 150.0, 400))
     steps = test(np.repeat([0.0, 50.0, 150.0, 50.0], 100))

@@ -12,7 +12,6 @@ import pytest
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import prepare
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.record import Array, Record
 from pzd.report.damper_models import DamperModels
@@ -64,7 +63,7 @@ def test_the_force_drawn_is_the_one_judged(rng: np.random.Generator) -> None:
     )  # fmt: skip
     diagnosed = SimpleNamespace(baseline=damper, damper=damper)
     drawn, _ = DamperModels(diagnosed, ()).simulated(recorded)  # type: ignore[arg-type]  # two dampers are all it asks
-    (part,) = prepare((recorded,))
+    (part,) = clean((recorded,))
     inside = np.isin(recorded.time, part.record.time)
     np.testing.assert_array_equal(drawn[inside], predicted_force(damper, part))
     assert np.std((drawn - truth)[500:-500]) < 5.0

@@ -9,7 +9,8 @@ from stepped_motions import NO_STEPS, STEPS, TIME
 
 from pzd.artefacts import Rig
 from pzd.damper.element import element_force
-from pzd.diagnosis.data import prepare, split
+from pzd.diagnosis.cleaned_records import clean
+from pzd.diagnosis.roles import split
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.record import Array, Record
@@ -58,7 +59,7 @@ def test_two_tests_in_one_record_have_measures_each_and_give_the_parameters_toge
 
 
 def test_two_tests_in_one_record_are_diagnosed_as_two_under_one_name(rng: Generator) -> None:
-    prepared = prepare([record(STEPS["two speeds"], rng)])
-    assert [p.record.name for p in prepared] == ["r", "r"]
-    assert [p.cycles.frequency for p in prepared if p.cycles] == pytest.approx([1.0, 2.0], rel=1e-3)
-    assert split(prepared, None, 2.0).held_out == ("r",)
+    cleaned = clean([record(STEPS["two speeds"], rng)])
+    assert [p.record.name for p in cleaned] == ["r", "r"]
+    assert [p.cycles.frequency for p in cleaned if p.cycles] == pytest.approx([1.0, 2.0], rel=1e-3)
+    assert split(cleaned, None, 2.0).held_out == ("r",)

@@ -42,12 +42,13 @@ from pzd.damper.effect import Effect
 from pzd.damper.model import Damper
 from pzd.diagnosis import cross_validation, gap, thresholds
 from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.cleaned_records import centred_on, clean, unsaturated_records
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation
-from pzd.diagnosis.data import centred_on, prepare, split, unsaturated_records
 from pzd.diagnosis.fit.least_squares import FitResult, fit, profiled_misfit
 from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.diagnosis.fit.problem import Problem
+from pzd.diagnosis.roles import split
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import promised_drop
 from pzd.diagnosis.search.forward_selection import select_effects
@@ -240,11 +241,11 @@ def prepared_case(config: RunConfig, setup: BenchmarkSetup, case: PlannedCase) -
         truth = read_json(places.truth(case.id), Truth, setup.control)
         rig = ingest(RigConfig(files=(FilesEntry(path="rig/*.csv"),)), setup.control, places.case(case.id))
         identified = identify(config.identify, rig, config.seed)
-        recorded = prepare(unsaturated_records(rig, None)[0])
-    prepared = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
+        recorded = clean(unsaturated_records(rig, None)[0])
+    cleaned = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
     group = config.identify.group
-    parts = split(prepared, group.voltage_V, group.temperature_degC)
-    return Case(truth, Campaign(prepared, parts, config.diagnose.nuisance), base_of(identified.rows, None))
+    parts = split(cleaned, group.voltage_V, group.temperature_degC)
+    return Case(truth, Campaign(cleaned, parts, config.diagnose.nuisance), base_of(identified.rows, None))
 
 
 def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, float], str], set[tuple[str, float]]]:
@@ -256,16 +257,16 @@ def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, f
     setup = BenchmarkSetup(blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
     case = plan(blind)[number]
     keep_fits()
-    prepared = prepared_case(config, setup, case)
-    judged: Callable[[Answer], str] = partial(outcome, case, prepared.truth)
-    stands = searched(prepared, config.diagnose, checked=True)
+    cleaned = prepared_case(config, setup, case)
+    judged: Callable[[Answer], str] = partial(outcome, case, cleaned.truth)
+    stands = searched(cleaned, config.diagnose, checked=True)
     usual = answered(stands, config.diagnose)
     outcomes, changed = {}, set()
     for name in names():
         for factor in (0.5, 2.0):
             with instead(name, factor, config.diagnose) as other:
                 checked = gap not in users(name)
-                found = stands if acts_after(name) else searched(prepared, other, checked=checked)
+                found = stands if acts_after(name) else searched(cleaned, other, checked=checked)
                 answer = answered(found, other)
             outcomes[name, factor] = judged(answer)
             if answer != usual:

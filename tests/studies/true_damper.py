@@ -21,11 +21,12 @@ from pzd.blind.plan import plan
 from pzd.config import RunConfig
 from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import Campaign, evidence_of
-from pzd.diagnosis.data import centred_on, prepare, split, unsaturated_records
+from pzd.diagnosis.cleaned_records import centred_on, clean, unsaturated_records
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.problem import Budget
 from pzd.diagnosis.gap import probability_of_noise, visible_gap
 from pzd.diagnosis.mains import with_hum
+from pzd.diagnosis.roles import split
 from pzd.identification.stage import identify
 from pzd.pipeline.command import opened
 from pzd.record import mid_stroke
@@ -53,12 +54,12 @@ def left_by_the_truth(config: RunConfig, setup: BenchmarkSetup, folder: Path, tr
     stand = RigConfig(files=(FilesEntry(path="rig/*.csv"),), limits=config.rig.limits)
     rig = ingest(stand, setup.control, folder)
     identified = identify(config.identify, rig, config.seed)
-    recorded = prepare(unsaturated_records(rig, None)[0])
-    prepared = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
-    parts = split(prepared, config.identify.group.voltage_V, config.identify.group.temperature_degC)
+    recorded = clean(unsaturated_records(rig, None)[0])
+    cleaned = centred_on(recorded, mid_stroke(each.record.displacement for each in recorded))
+    parts = split(cleaned, config.identify.group.voltage_V, config.identify.group.temperature_degC)
     baseline = base_of(identified.rows, None)
-    prepared = with_hum(prepared, baseline)
-    campaign = Campaign(prepared, parts, config.diagnose.nuisance, 1, Budget(config.diagnose.most_evaluations))
+    cleaned = with_hum(cleaned, baseline)
+    campaign = Campaign(cleaned, parts, config.diagnose.nuisance, 1, Budget(config.diagnose.most_evaluations))
     whole = evidence_of(campaign, baseline).whole
     of_voltages = (
         whole if len(whole.base) == len(truth.base) else whole.pooled_temperatures()

@@ -57,7 +57,7 @@ def comparisons_of(
     ------
     DataError : when none of the second state repeats
     """
-    one, other = averaged(before.prepared), averaged(after.prepared)
+    one, other = averaged(before.cleaned), averaged(after.cleaned)
     if not other:
         raise DataError(
             f"{after.name}: no test repeats its motion at a constant control signal, so there is no cycle to compare; "
@@ -161,7 +161,7 @@ def error_in_own_tests(state: State, nuisance: NuisanceConfig) -> ModelError:
     """Compute the error of the damper of a state in the tests of that state."""
     alone = [
         model_compared(state.damper, test, float(test.displacement[0].real), test.temperature)
-        for test in averaged(state.prepared)
+        for test in averaged(state.cleaned)
     ]
     return ModelError.of(alone, nuisance) if alone else ModelError(0.0, np.zeros(1))
 

@@ -10,10 +10,12 @@ import numpy as np
 from pzd.artefacts import Rig
 from pzd.artefacts.changes import Course, CourseRow, Numbers, Verdict
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate
-from pzd.diagnosis.changes.comparison import Findings, findings_between
+from pzd.diagnosis.changes.findings import Findings, findings_between
 from pzd.diagnosis.changes.pairs import averaged
+from pzd.diagnosis.changes.quantities import refitted
 from pzd.diagnosis.changes.selection import GAIN
 from pzd.diagnosis.changes.state import State
+from pzd.diagnosis.changes.verdict import changes_of
 from pzd.diagnosis.config import ChangesConfig, DiagnoseConfig
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
@@ -62,7 +64,7 @@ def followed_over(
     first, *later = states
     slack = first.voltage_slack(identify.group.voltage_V)
     found = [findings_between(first, state, diagnose, identify, control) for state in later]
-    results = [each.changes() for each in found]
+    results = [changes_of(each) for each in found]
     changed = {key for each in found for c in each.best.candidates if c.of == "damper" for key in c.key}
     adopted = changed | _limited(found, changes.tolerance)
     rows = [*_quantities(found, adopted, control), *_peak_forces(states, changes, slack)]
@@ -109,7 +111,7 @@ def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], contro
     values: dict[tuple[str, str], list[tuple[Numbers, Numbers, Numbers]]] = {}
     starts: dict[tuple[str, str], tuple[Numbers, str, tuple[float, ...] | None]] = {}
     for number, each in enumerate(found):
-        for change in each.refitted(_together_with(each, adopted)):
+        for change in refitted(each, _together_with(each, adopted)):
             key = (change.name, change.parameter)
             if key not in values:
                 values[key] = [(None, None, None)] * number
@@ -137,7 +139,7 @@ def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candi
     changed = any(name in ELEMENT_COLUMNS for name, _ in adopted)
     theirs = changed and not any(c.per_voltage for c in found.search.candidates)
     chosen = [c for c in found.best.candidates if not (theirs and c.name == GAIN)]
-    followed = adopted | {("T0", "T0")} | {(u.name, u.parameter) for u in found.changes().unchanged if u.name == "C"}
+    followed = adopted | {("T0", "T0")} | {(u.name, u.parameter) for u in changes_of(found).unchanged if u.name == "C"}
     for candidate in found.search.candidates:
         have = {key for c in chosen for key in c.key}
         if set(candidate.key) <= followed and not set(candidate.key) & have and not candidate.per_voltage:
@@ -184,10 +186,10 @@ def _peak_force(
     slack : by how much that of a test may differ from it [V]
     """
     points = []
-    for test in averaged(state.prepared):
+    for test in averaged(state.cleaned):
         if voltage is not None and (test.voltage is None or abs(test.voltage - voltage) > slack):
             continue
-        v, force = test.prepared.mean_motion[1], test.prepared.folded
+        v, force = test.cleaned.mean_motion[1], test.cleaned.folded
         at = int(np.argmax(side * v))
         points.append((side * float(v[at]), float(np.mean(force[:, at])), float(np.std(force[:, at], ddof=1)),
                        len(force)))  # fmt: skip

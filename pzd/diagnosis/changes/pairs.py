@@ -19,7 +19,7 @@ import numpy as np
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.fit.prediction import simulated_record
 from pzd.record import CONSTANT_SHARE, MAD_TO_SIGMA, Array, Complex, Mask, Record
 from pzd.signals.harmonics import mains_harmonics
@@ -78,25 +78,25 @@ def course(spectrum: Complex, points: int) -> Array:
 class AveragedTest:
     """Averaged cycle of one test of constant control signal."""
 
-    prepared: PreparedRecord
+    cleaned: CleanedRecord
     error: PureError
     """Force: its harmonics, and their variance by noise."""
 
     @property
     def record(self) -> Record:
         """The cleaned record."""
-        return self.prepared.record
+        return self.cleaned.record
 
     @cached_property
     def frequency(self) -> float:
         """Frequency of the cycles [Hz]."""
-        run = self.prepared.cycles
+        run = self.cleaned.cycles
         return 0.0 if run is None else run.frequency
 
     @cached_property
     def displacement(self) -> Complex:
         """(H + 1,) harmonics of the displacement [m]."""
-        x = self.prepared.mean_motion[0]
+        x = self.cleaned.mean_motion[0]
         return np.asarray(np.fft.rfft(x)[: max(x.size // 2, 2)] / x.size)
 
     @cached_property
@@ -110,12 +110,12 @@ class AveragedTest:
         return self.record.median_temperature()
 
 
-def averaged(prepared: Sequence[PreparedRecord]) -> list[AveragedTest]:
+def averaged(cleaned: Sequence[CleanedRecord]) -> list[AveragedTest]:
     """Return the tests of constant control signal whose motion repeats."""
-    return [AveragedTest(p, pure_error(p.folded)) for p in prepared if has_average_cycle(p)]
+    return [AveragedTest(p, pure_error(p.folded)) for p in cleaned if has_average_cycle(p)]
 
 
-def has_average_cycle(test: PreparedRecord) -> bool:
+def has_average_cycle(test: CleanedRecord) -> bool:
     """Whether the motion of a test repeats at a constant control signal."""
     return test.cycles is not None and test.constant
 
@@ -337,7 +337,7 @@ def displacement_variance(damper: Damper, test: AveragedTest, last: int) -> Arra
     With the instants of jumps, which `pzd.diagnosis.fit.prediction` leaves out of its own: there samples beside a jump
     do not count, while a harmonic has no samples that could be left out.
     """
-    draws = test.prepared.draws
+    draws = test.cleaned.draws
     if len(draws) < 2:
         return np.zeros(last + 1)
     points = test.error.points
@@ -369,7 +369,7 @@ def jump_columns(test: AveragedTest, counted: Mask, shift: float) -> Array:
     counted : (H + 1,) which harmonics are compared
     shift : of the beginning of its cycle [cycles]
     """
-    cycle = test.prepared.folded.mean(axis=0)
+    cycle = test.cleaned.folded.mean(axis=0)
     steps = np.roll(cycle, -1) - cycle
     usual = MAD_TO_SIGMA * float(np.median(np.abs(np.roll(steps, -1) - steps)))
     jump = np.abs(np.roll(steps, -1) - steps) > JUMP * usual

@@ -12,10 +12,9 @@ from pzd.artefacts.identified import identified_damper
 from pzd.damper.effect import Scales
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import Damper
-from pzd.diagnosis import data
 from pzd.diagnosis.campaign import flow_of
+from pzd.diagnosis.cleaned_records import CleanedRecord, clean, unsaturated_records
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.data import PreparedRecord
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Record, mid_stroke, voltage_scale
@@ -30,7 +29,7 @@ class State:
     """One state of a damper."""
 
     name: str
-    prepared: tuple[PreparedRecord, ...]
+    cleaned: tuple[CleanedRecord, ...]
     damper: Damper
     """As identified and diagnosed; its T0, C and k where nobody diagnosed."""
     voltage_scale: float
@@ -41,16 +40,16 @@ class State:
     @classmethod
     def of(cls, name: str, rig: Rig, identified: Identified, setting: str | None, control: Control) -> State:
         """Return a state with the damper that identify found."""
-        records, _ = data.unsaturated_records(rig, setting)
+        records, _ = unsaturated_records(rig, setting)
         rows = [row for row in identified.undetermined if row.setting == setting]
         lacking = [f"{row.words(control, name)}: {row.status}" for row in rows]
         damper = identified_damper(identified, setting)
-        return cls(name, data.prepare(records), damper, voltage_scale(records), tuple(lacking))
+        return cls(name, clean(records), damper, voltage_scale(records), tuple(lacking))
 
     @property
     def records(self) -> list[Record]:
         """The cleaned records."""
-        return [p.record for p in self.prepared]
+        return [p.record for p in self.cleaned]
 
     def voltage_slack(self, given: float | None = None) -> float:
         """Return by how much control signals of one level may differ [V].
@@ -78,7 +77,7 @@ class State:
             largest([float(np.max(np.abs(r.acceleration))) for r in self.records]),
             max(float(np.median([row.C_Ns_per_m for row in self.damper.base])), SOFTEST * largest(peaks) / speed),
             self.voltage_scale,
-            flow_of(self.damper, self.prepared),
+            flow_of(self.damper, self.cleaned),
         )
 
 

@@ -19,7 +19,7 @@ from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moment
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import effective_voltage
-from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.fit.prediction import (
     PredictedForce,
     drawn_calm,
@@ -420,7 +420,7 @@ Reason: 25 points for each of the harmonics that are compared."""
 
 
 def weighted_record(
-    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+    p: CleanedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
 ) -> WeightedRecord | None:
     """Weigh some samples of a record; None where they are too few.
 
@@ -437,7 +437,7 @@ def weighted_record(
 
 
 def weighed_by_noise(
-    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
+    p: CleanedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
 ) -> WeightedRecord | None:
     """Weigh some samples of a record by noise alone, no nuisance integrated out; see `weighted_record`."""
     if not enough_samples(p, mask):
@@ -445,7 +445,7 @@ def weighed_by_noise(
     return (_from_cycles if _is_averaged(p) else _from_samples)(p, mask, base_row, given)
 
 
-def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
+def enough_samples(p: CleanedRecord, mask: NDArray[np.bool_]) -> bool:
     """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
 
     Parameters
@@ -458,13 +458,13 @@ def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
     return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
 
 
-def _is_averaged(p: PreparedRecord) -> bool:
+def _is_averaged(p: CleanedRecord) -> bool:
     """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
     return p.cycles is not None and not temperature_moves(p.record.temperature)
 
 
 def _from_cycles(
-    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
+    p: CleanedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce
 ) -> WeightedRecord | None:
     run = p.cycles
     if run is None:
@@ -544,7 +544,7 @@ def _resampled(cycle: Array, points: int) -> Array:
     return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
 
 
-def _from_samples(p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce) -> WeightedRecord:
+def _from_samples(p: CleanedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce) -> WeightedRecord:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
     first, *_, last = np.flatnonzero(mask)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pzd.damper.compose import jump_at_reversal, respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
-from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, Rows
 from pzd.signals.jumps import beside_unresolved_reversals, jump_timing_error, jumps
@@ -41,10 +41,10 @@ END_SHARE = 0.02
 """Share of a record at either end that is not compared: the smoothed displacement rests on one side alone there."""
 
 
-def predicted_force(damper: Damper, prepared: PreparedRecord) -> Array:
+def predicted_force(damper: Damper, cleaned: CleanedRecord) -> Array:
     """Predict the (n,) force of a damper under the record's cleaned motion [N]."""
-    record = prepared.lead or prepared.record
-    return simulated_record(damper, record)[prepared.lead_samples :]
+    record = cleaned.lead or cleaned.record
+    return simulated_record(damper, record)[cleaned.lead_samples :]
 
 
 def simulated_record(damper: Damper, record: Record) -> Array:
@@ -87,19 +87,19 @@ def end_temperatures(temperature: Array) -> tuple[float, float]:
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
-def comparable_samples(prepared: PreparedRecord) -> NDArray[np.bool_]:
+def comparable_samples(cleaned: CleanedRecord) -> NDArray[np.bool_]:
     """Return (n,) whether a prediction can be compared with a sample.
 
     It depends neither on how the record began nor on when exactly a voltage stepped; and something moves, or has just
     come to rest.
     """
-    size = prepared.record.time.size
-    if prepared.lead is not None:
+    size = cleaned.record.time.size
+    if cleaned.lead is not None:
         return np.ones(size, dtype=np.bool_)
     ends = int(END_SHARE * size)
     order = np.arange(size)
     inside = (order >= ends) & (order < size - ends)
-    return inside & in_motion(prepared.record) & ~_stepping(prepared.record)
+    return inside & in_motion(cleaned.record) & ~_stepping(cleaned.record)
 
 
 def _stepping(record: Record) -> NDArray[np.bool_]:
@@ -143,21 +143,21 @@ class PredictedForce:
     """Other motions of a record that does not repeat, as likely as its own, each with its force (n,) [N]."""
 
 
-def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> PredictedForce:
+def predict(damper: Damper, cleaned: CleanedRecord, delay: float) -> PredictedForce:
     """Predict the force of a damper in a record, with its uncertainty.
 
     Parameters
     ----------
     damper : that predicts
-    prepared : the record
+    cleaned : the record
     delay : standard deviation of a test's own delay [s]
     """
-    force = predicted_force(damper, prepared)
-    timing = _timing(damper, prepared, force, delay)
-    if prepared.lead is None:
-        drawn = tuple((draw, simulated_record(damper, draw)) for draw in prepared.draws[1:])
+    force = predicted_force(damper, cleaned)
+    timing = _timing(damper, cleaned, force, delay)
+    if cleaned.lead is None:
+        drawn = tuple((draw, simulated_record(damper, draw)) for draw in cleaned.draws[1:])
         return PredictedForce(damper, force, 0.0, timing, drawn)
-    shared = displacement_variance(damper, prepared) + prepared.hum_variance
+    shared = displacement_variance(damper, cleaned) + cleaned.hum_variance
     return PredictedForce(damper, force, shared, timing, ())
 
 
@@ -195,16 +195,16 @@ def drawn_calm(given: PredictedForce, calm: Mask, counted: Mask) -> list[tuple[R
     return [(record, np.where(calm, force, given.force)[counted]) for record, force in given.drawn]
 
 
-def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float) -> Array:
-    record = prepared.record
-    if prepared.constant or record.voltage is None:
+def _timing(damper: Damper, cleaned: CleanedRecord, force: Array, delay: float) -> Array:
+    record = cleaned.record
+    if cleaned.constant or record.voltage is None:
         return np.zeros((force.size, 0))
     late = replace(record, voltage=np.concatenate([record.voltage[:1], record.voltage[:-1]]))
-    change = predicted_force(damper, replace(prepared, record=late)) - force
+    change = predicted_force(damper, replace(cleaned, record=late)) - force
     return np.asarray(np.hypot(BETWEEN_SAMPLES, delay * record.rate) * change[:, None])
 
 
-def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | float:
+def displacement_variance(damper: Damper, cleaned: CleanedRecord) -> Array | float:
     """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
 
     What they change beside a jump is its instant, which is left to chance, as far as it goes: what a sample earlier or
@@ -218,25 +218,25 @@ def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | f
     Parameters
     ----------
     damper : that predicts
-    prepared : the record
+    cleaned : the record
 
     Returns
     -------
     (H + 1,) variance |.|^2 [N^2]; 0 where nothing repeats
     """
-    if not prepared.draws:
+    if not cleaned.draws:
         return 0.0
-    points = prepared.draws[0].time.size // 2
-    known, *others = (simulated_record(damper, draw)[points:] for draw in prepared.draws)
-    turns = unresolved_turns(damper, prepared.draws[0].displacement[points:], closed=True)
+    points = cleaned.draws[0].time.size // 2
+    known, *others = (simulated_record(damper, draw)[points:] for draw in cleaned.draws)
+    turns = unresolved_turns(damper, cleaned.draws[0].displacement[points:], closed=True)
     calm = np.maximum(jumps(known, closed=True), turns) == 0.0
     by_timing = np.stack([jump_timing_error(other, known, closed=True) for other in others])
     left = np.stack(others) - known - np.where(calm, 0.0, by_timing)
     changes = np.fft.rfft(left, points, axis=1) / points
     # Of an uneven clock, parts of a record have not quite the same number of points a cycle.
-    size = harmonics_of(prepared.folded.shape[1]) + 1
-    power = prepared.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[:size]
-    beside_jumps = prepared.read_alike * np.mean(np.mean(left * ~calm, axis=1) ** 2)
+    size = harmonics_of(cleaned.folded.shape[1]) + 1
+    power = cleaned.read_alike * np.mean(np.abs(changes) ** 2, axis=0)[:size]
+    beside_jumps = cleaned.read_alike * np.mean(np.mean(left * ~calm, axis=1) ** 2)
     power[0] = 0.0
     width = np.ones(2 * NEIGHBOURS + 1)
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")

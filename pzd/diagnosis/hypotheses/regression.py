@@ -16,8 +16,8 @@ from pzd.damper.confounders import known
 from pzd.damper.element import STIFFEST
 from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import nearest_row
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.diagnosis.cross_validation import CrossValidation, assign_folds
-from pzd.diagnosis.data import PreparedRecord
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.diagnosis.gap import ResidualCheck, jump_bend
 from pzd.diagnosis.hypotheses.shapes import Shape, Signals, shapes_of, signals_of
@@ -235,7 +235,7 @@ class RecordResidual:
     @cached_property
     def nuisances(self) -> Array:
         """(n, c) force of one standard deviation of the test's own offset, gain and delay [N]."""
-        return nuisance_columns(self.signals.F, self.check.prepared.record.rate, self.config)
+        return nuisance_columns(self.signals.F, self.check.cleaned.record.rate, self.config)
 
     def nuisance_part(self, residual: Array, counts: Mask) -> Array:
         """Compute the (n,) part of a residual (n,) explained by offset, gain and delay fitted to some samples [N]."""
@@ -280,7 +280,7 @@ class Residuals:
     @cached_property
     def regression(self) -> Regression:
         """The tests as inner products, in the folds of the cross-validation."""
-        folds = assign_folds([test.check.prepared for test in self.tests], self.validation.baseline).folds
+        folds = assign_folds([test.check.cleaned for test in self.tests], self.validation.baseline).folds
         parts = []
         for i, test in enumerate(self.tests):
             shapes = [found for shape in self.shapes for _, found in shape.columns(test.signals)]
@@ -300,7 +300,7 @@ class Residuals:
         return tuple(found)
 
     def _part(self, record: int, fold: int, test: RecordResidual, columns: Array, counts: Mask) -> RecordProducts:
-        force = test.check.prepared.record.force[counts]
+        force = test.check.cleaned.record.force[counts]
         _, energy, spread = squared_sums(force, test.check.residual[counts])
         return RecordProducts(
             record=record,
@@ -318,8 +318,8 @@ class Residuals:
         found: dict[float | None, list[RecordResidual]] = {}
         nodes = [row.voltage_V for row in self.validation.baseline.base if row.voltage_V is not None]
         for test in self.tests:
-            prepared = test.check.prepared
-            own = prepared.record.median_voltage() if prepared.constant else None
+            cleaned = test.check.cleaned
+            own = cleaned.record.median_voltage() if cleaned.constant else None
             at = None if own is None or not nodes else min(nodes, key=lambda node: abs(node - own))
             found.setdefault(at, []).append(test)
         return dict(sorted(found.items(), key=lambda item: (item[0] is None, item[0] or 0.0)))
@@ -336,15 +336,15 @@ def residuals_of(validation: CrossValidation, damper: Damper) -> Residuals:
     campaign = validation.campaign
     checks = campaign.checks(damper)
     gap = float(np.mean([max(check.power, 0.0) for check in checks]))
-    recorded = [t for check in checks if (t := check.prepared.record.median_temperature()) is not None]
+    recorded = [t for check in checks if (t := check.cleaned.record.median_temperature()) is not None]
     temperature = float(np.median(recorded)) if recorded else None
-    half_stroke = max(float(np.max(np.abs(check.prepared.record.displacement))) for check in checks)
+    half_stroke = max(float(np.max(np.abs(check.cleaned.record.displacement))) for check in checks)
 
     def made(check: ResidualCheck) -> RecordResidual:
         return RecordResidual(
             check,
-            signals_of(check.prepared, check.predicted, temperature, half_stroke),
-            tangents(damper, check.prepared, check.predicted),
+            signals_of(check.cleaned, check.predicted, temperature, half_stroke),
+            tangents(damper, check.cleaned, check.predicted),
             _regression_samples(check),
             campaign.nuisance,
             check.variance + gap,
@@ -355,7 +355,7 @@ def residuals_of(validation: CrossValidation, damper: Damper) -> Residuals:
 
 def _regression_samples(check: ResidualCheck) -> Mask:
     """Return the (n,) checked samples away from jumps, evenly thinned."""
-    counts = check.wanted & (jump_bend(check.prepared, check.predicted) == 0.0)
+    counts = check.wanted & (jump_bend(check.cleaned, check.predicted) == 0.0)
     rows = np.flatnonzero(counts)
     thinned: Mask = np.zeros(counts.size, dtype=np.bool_)
     thinned[rows[:: -(-rows.size // MOST_SAMPLES) or 1]] = True
@@ -365,18 +365,18 @@ def _regression_samples(check: ResidualCheck) -> Mask:
 # --- Tangents: what T0, C, k and the parameters of adopted effects could explain of a residual, to first order
 
 
-def tangents(damper: Damper, prepared: PreparedRecord, force: Array) -> dict[ParameterKey, Array]:
+def tangents(damper: Damper, cleaned: CleanedRecord, force: Array) -> dict[ParameterKey, Array]:
     """Compute the (n,) change of the force [N] for a relative change by one of each parameter that a test depends on.
 
     Parameters
     ----------
     damper : adopted damper, about the middle of the stroke
-    prepared : the test
+    cleaned : the test
     force : (n,) that the damper gives in it [N]
     """
-    rows: Sequence[int] = [nearest_row(damper.base, prepared)] if prepared.constant else range(len(damper.base))
+    rows: Sequence[int] = [nearest_row(damper.base, cleaned)] if cleaned.constant else range(len(damper.base))
     perturbed = (*_perturbed_base(damper, rows), *_perturbed_effects(damper, rows))
-    return {key: (predicted_force(moved, prepared) - force) / STEP for key, moved in perturbed}
+    return {key: (predicted_force(moved, cleaned) - force) / STEP for key, moved in perturbed}
 
 
 def _perturbed_base(damper: Damper, rows: Sequence[int]) -> Iterator[tuple[ParameterKey, Damper]]:

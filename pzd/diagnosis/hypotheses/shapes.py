@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 
 # --- Signals along a test, and columns that take more than one expression
@@ -122,21 +122,21 @@ def while_running(s: Signals) -> Iterator[tuple[float | None, Array]]:
         tau *= 2.0
 
 
-def signals_of(prepared: PreparedRecord, force: Array, temperature: float | None, half_stroke: float) -> Signals:
+def signals_of(cleaned: CleanedRecord, force: Array, temperature: float | None, half_stroke: float) -> Signals:
     """Return the signals along one test.
 
     Parameters
     ----------
-    prepared : the test, its displacement cleaned and counted from the middle of the stroke
+    cleaned : the test, its displacement cleaned and counted from the middle of the stroke
     force : (n,) predicted force [N]
     temperature : median of all tests [degC]; None where none was recorded
     half_stroke : of all tests [m]
     """
-    record = prepared.record
+    record = cleaned.record
     own = record.median_temperature()
     T = 0.0 if own is None or temperature is None else own - temperature
     U = np.zeros(force.size) if record.voltage is None else record.voltage
-    if prepared.constant and record.voltage is not None:
+    if cleaned.constant and record.voltage is not None:
         U = np.full(force.size, record.median_voltage())
     return Signals(
         t=record.time - record.time[0],

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord
 from pzd.record import Array
 
 
@@ -33,12 +33,12 @@ class StrokeMotion:
     """Samples in front, for a state to settle."""
 
     @classmethod
-    def of(cls, prepared: PreparedRecord) -> StrokeMotion:
+    def of(cls, cleaned: CleanedRecord) -> StrokeMotion:
         """Return the cleaned motion of a record, with its lead."""
-        record = prepared.lead or prepared.record
+        record = cleaned.lead or cleaned.record
         x = record.displacement
         middle = 0.5 * float(np.min(x) + np.max(x))
-        return cls(x - middle, record.velocity, 1.0 / record.rate, prepared.lead_samples)
+        return cls(x - middle, record.velocity, 1.0 / record.rate, cleaned.lead_samples)
 
 
 @dataclass(frozen=True)

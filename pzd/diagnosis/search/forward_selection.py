@@ -541,7 +541,7 @@ def law_beside(campaign: Campaign, damper: Damper, effects: Sequence[str]) -> Da
     """
     without = damper.without_effects(*effects)
     tests: dict[int, list[Record]] = {}
-    for p in campaign.prepared:
+    for p in campaign.cleaned:
         if p.constant:
             force = p.record.force - (predicted_force(damper, p) - predicted_force(without, p))
             tests.setdefault(nearest_row(damper.base, p), []).append(replace(p.record, force=force))

@@ -11,7 +11,8 @@ from pzd.artefacts.changes import Change, Changes
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.changes.comparison import changes_between, findings_between
+from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.findings import findings_between
 from pzd.diagnosis.changes.regression import Likelihood
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.config import DiagnoseConfig

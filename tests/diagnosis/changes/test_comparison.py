@@ -27,7 +27,8 @@ from pzd.artefacts.changes import Change
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.changes.comparison import _is_determined, _is_little, _may_be_as_before, changes_between
+from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.quantities import is_determined, is_little, may_be_as_before
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
@@ -510,23 +511,23 @@ def change(name: str, low: float, parameter: str = "", share: float = 0.5) -> Ch
 
 def test_what_the_tests_do_not_determine_is_not_as_it_was() -> None:
     """An interval over seven decades stood under `unchanged`, since it held what was before."""
-    assert _is_determined(change("knee", 80.0))
-    assert not _is_determined(change("knee", 0.05))
+    assert is_determined(change("knee", 80.0))
+    assert not is_determined(change("knee", 0.05))
 
 
 def test_a_little_change_is_believed_where_its_interval_leaves_out_what_was() -> None:
     """A gain of 4 (-18 to 10) % of no part of the difference was told as what the stand had done."""
-    assert _is_little([change("C", 80.0, share=0.01)], "C")
-    assert not _is_little([change("C", 80.0)], "C")
+    assert is_little([change("C", 80.0, share=0.01)], "C")
+    assert not is_little([change("C", 80.0)], "C")
     unseen = change("knee", 80.0, "F_comp").model_copy(update={"to": None, "low95": None, "high95": None})
-    assert _may_be_as_before([unseen, change("knee", 80.0, "F_reb")]) == ["knee"]
+    assert may_be_as_before([unseen, change("knee", 80.0, "F_reb")]) == ["knee"]
 
 
 def test_what_may_be_as_it_was_is_said_to_be_open() -> None:
     """Of a change all of whose intervals hold the first value, and of no other one."""
-    assert _may_be_as_before([change("C", 80.0), change("T0", 101.0)]) == ["C"]
+    assert may_be_as_before([change("C", 80.0), change("T0", 101.0)]) == ["C"]
     law = [change("second_branch", 80.0, "T0_2"), change("second_branch", 101.0, "k_2")]
-    assert _may_be_as_before(law) == []
+    assert may_be_as_before(law) == []
 
 
 JET = {"beta": 0.2, "F_reb": 640.0, "C_reb": 1400.0, "F_comp": 360.0, "C_comp": 840.0, "q_reb": 1.1e5, "q_comp": 5e4}

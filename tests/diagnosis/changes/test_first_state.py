@@ -27,10 +27,13 @@ from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import Coordinate, FirstState, candidates, element_of
 from pzd.diagnosis.changes.compared_tests import ModelError, comparisons_of
-from pzd.diagnosis.changes.comparison import Findings, changes_between, findings_between
+from pzd.diagnosis.changes.comparison import changes_between
+from pzd.diagnosis.changes.findings import Findings, findings_between
+from pzd.diagnosis.changes.quantities import _values
 from pzd.diagnosis.changes.regression import Fitted
 from pzd.diagnosis.changes.selection import Search, _scaled
 from pzd.diagnosis.changes.uncertainty import Uncertainty
+from pzd.diagnosis.changes.verdict import changes_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.fit.intervals import LEVEL
 from pzd.identification.config import IdentifyConfig
@@ -133,7 +136,7 @@ def test_a_part_that_no_verdict_names_is_asked_last_where_the_first_state_has_it
     asked = candidates(found.first, found.comparisons)
     assert all(c.flexible for c in asked if c.name == "second_branch")
     assert not any(c.flexible for c in asked if c.name in ("T0", "C", "k"))
-    assert "second_branch" in names_told(found.changes())
+    assert "second_branch" in names_told(changes_of(found))
 
 
 def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_number(rng: np.random.Generator) -> None:
@@ -147,8 +150,8 @@ def test_a_valve_of_which_a_number_does_nothing_is_no_change_and_has_no_such_num
     start = np.array([opens.low, np.log(500.0 / slope.scale)])
     fitted = search.regression.fit((valve,), start, found.best.scatter)
     assert not search._admissible(fitted, 0.0)
-    assert found._values([(opens, opens.low, np.inf)])[2:] == (None, None, None)
-    assert names(found.changes()) == ["C"]
+    assert _values(found, [(opens, opens.low, np.inf)])[2:] == (None, None, None)
+    assert names(changes_of(found)) == ["C"]
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.25])
@@ -328,7 +331,7 @@ def test_what_the_model_hides_is_told_by_a_motion_of_the_first_state_run_again(r
 def test_the_gas_of_an_accumulator_is_among_what_may_have_changed(rng: np.random.Generator) -> None:
     damper = drawn_damper(rng, (0.0,))
     found = findings(rng, damper, damper.with_effect("accumulator", {"F_g": 60.0, "L": 3.0 * STROKE}))
-    assert "accumulator" in names_told(found.changes())
+    assert "accumulator" in names_told(changes_of(found))
 
 
 def test_what_has_no_name_leaves_open_what_did_not_change_and_so_does_what_was_too_small(

@@ -14,9 +14,10 @@ from pzd.blind.independent.stand import Actuator, LaboratoryCampaign, Laboratory
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.prediction import displacement_variance, predict, predicted_force
 from pzd.diagnosis.gap import check_residual, visible_gap
+from pzd.diagnosis.roles import HELD_OUT, TRAINING, split
 from pzd.record import Array, Record
 from pzd.signals.noise import pure_error
 from pzd.signals.nuisance import NuisanceConfig
@@ -29,9 +30,9 @@ def test_something_of_the_largest_force_speed_and_displacement_is_fitted(
 ) -> None:
     # Two tests: the fast one holds the largest force and speed, the slow one the largest displacement.
     tests = ((0.5, 0.03), (2.5, 0.02))
-    prepared = prepare(sines(damper_of((0.0,)), rng, (0.0,), tests=tests, cycles=4))
-    roles = split(prepared, None, 2.0).roles
-    peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
+    cleaned = clean(sines(damper_of((0.0,)), rng, (0.0,), tests=tests, cycles=4))
+    roles = split(cleaned, None, 2.0).roles
+    peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in cleaned]
     fitted = [peak for peak, role in zip(peaks, roles, strict=True) if np.any(role == TRAINING)]
     assert max(fitted) > 0.95 * max(peaks)
     assert any(np.any(role == HELD_OUT) for role in roles)
@@ -64,12 +65,12 @@ def triangle(noise: float, rng: np.random.Generator) -> tuple[Record, Array]:
 def test_the_force_reverses_at_the_corners_of_a_triangle(rng: np.random.Generator) -> None:
     """13 um of noise in four cycles through 1.1 kN/mm are 7 N, of 300 N, and the harmonics that stand clear miss 40."""
     record, force = triangle(13e-6, rng)
-    (prepared,) = prepare((record,))
-    cycle = prepared.cycles
+    (cleaned,) = clean((record,))
+    cycle = cleaned.cycles
     assert cycle is not None
     inside = cycle.inside(record.time)
     missed = cycle.fold(record.time[inside], force[inside]).mean(axis=0)
-    missed = cycle.fold(prepared.record.time, predicted_force(STIFF, prepared)).mean(axis=0) - missed
+    missed = cycle.fold(cleaned.record.time, predicted_force(STIFF, cleaned)).mean(axis=0) - missed
     assert np.std(missed) < 2.0  # 3.2 where only harmonics of the whole cycle are kept
 
 
@@ -77,8 +78,8 @@ def test_what_the_acceleration_has_beyond_the_sampling_rate_does_not_fold_into_i
     rng: np.random.Generator,
 ) -> None:
     # Of the inertia of a rod: at a corner it has as much at every order, and the noise of a triangle was 90 times that.
-    (prepared,) = prepare((triangle(1e-6, rng)[0],))
-    known, *others = prepared.draws
+    (cleaned,) = clean((triangle(1e-6, rng)[0],))
+    known, *others = cleaned.draws
     points = known.time.size // 2
     odd = np.arange(1, 40, 2)
     own, *drawn = (np.fft.rfft(each.acceleration[points:])[odd] / points for each in (known, *others))
@@ -88,10 +89,10 @@ def test_what_the_acceleration_has_beyond_the_sampling_rate_does_not_fold_into_i
 
 def test_a_triangle_without_noise_is_predicted_exactly(rng: np.random.Generator) -> None:
     record, force = triangle(1e-9, rng)
-    (prepared,) = prepare((record,))
-    cycle = prepared.cycles
+    (cleaned,) = clean((record,))
+    cycle = cleaned.cycles
     assert cycle is not None
-    assert predicted_force(STIFF, prepared)[:100] == pytest.approx(force[cycle.inside(record.time)][:100], abs=0.5)
+    assert predicted_force(STIFF, cleaned)[:100] == pytest.approx(force[cycle.inside(record.time)][:100], abs=0.5)
 
 
 # --- Temperature of the fluid in a test over which it warms by less than a kelvin
@@ -126,20 +127,20 @@ def test_the_temperature_is_that_of_the_oil_at_the_ends_too(rng: Generator) -> N
     """Each end is one noisy sample; a smoothing that goes through it is wrong there for a second."""
     for _ in range(8):
         record, truth = warming(rng)
-        (prepared,) = prepare((record,))
-        cleaned = prepared.record.temperature
+        (cleaned,) = clean((record,))
+        cleaned = cleaned.record.temperature
         assert cleaned is not None
-        away = np.abs(cleaned - np.interp(prepared.record.time, record.time, truth))
+        away = np.abs(cleaned - np.interp(cleaned.record.time, record.time, truth))
         assert float(np.max(away)) < 0.4 * NOISE
 
 
 def test_the_predicted_force_falls_as_the_oil_warms(rng: Generator) -> None:
     record, _ = warming(rng)
-    (prepared,) = prepare((record,))
-    assert prepared.cycles is not None
-    forces = prepared.record.force, predicted_force(drifting(), prepared)
+    (cleaned,) = clean((record,))
+    assert cleaned.cycles is not None
+    forces = cleaned.record.force, predicted_force(drifting(), cleaned)
     measured, predicted = (
-        np.abs(np.fft.rfft(prepared.cycles.fold(prepared.record.time, force), axis=1)[:, 1]) for force in forces
+        np.abs(np.fft.rfft(cleaned.cycles.fold(cleaned.record.time, force), axis=1)[:, 1]) for force in forces
     )
     assert measured[-1] / measured[0] == pytest.approx(1.0 - 0.06 * WARMS_BY * 7 / 8, abs=0.004)
     np.testing.assert_allclose(predicted, measured, rtol=2e-3)
@@ -168,9 +169,9 @@ def test_the_error_of_a_sweep_is_as_large_as_that_of_the_others_drawn(
 ) -> None:
     """Read in 55 steps a stroke: the error of a step is no white noise, and its lines were once taken for motion."""
     record, true = swept(step, noise, rng)
-    (prepared,) = prepare((record,))
-    assert prepared.cycles is None
-    kept, others = prepared.draws[0], prepared.draws[1:]
+    (cleaned,) = clean((record,))
+    assert cleaned.cycles is None
+    kept, others = cleaned.draws[0], cleaned.draws[1:]
     inside = slice(500, -500)
     own = np.std((kept.velocity - true)[inside])
     drawn = np.mean([np.std((each.velocity - kept.velocity)[inside]) for each in others])
@@ -194,10 +195,10 @@ def test_noise_of_the_displacement_is_no_gap_in_motions_that_do_not_repeat(kind:
     x = motion.displacement[at] + 1e-5 * rng.standard_normal(at.size)
     v = np.gradient(x, motion.time[at])
     record = Record(kind, None, motion.time[at], x, v, np.gradient(v, motion.time[at]), reading, None)
-    (prepared,) = prepare((record,))
+    (cleaned,) = clean((record,))
     plain = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=7000.0, k_N_per_m=1e8),))
-    wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
-    check = check_residual(predict(plain, prepared, 5e-4), prepared, wanted, NuisanceConfig())
+    wanted = np.ones(cleaned.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(plain, cleaned, 5e-4), cleaned, wanted, NuisanceConfig())
     assert check.probability["smooth"][0] > 1e-4
     assert visible_gap([check]) < 0.0025
 
@@ -213,10 +214,10 @@ def test_steps_that_each_cycle_meets_at_the_same_places_are_no_motion(rate: floa
         frequency, steps = float(one.choice([0.5, 1.0, 2.0])), one.uniform(25.0, 400.0)
         t = np.arange(0.0, 6.0 / frequency, 1.0 / rate)
         x, step = 0.02 * np.sin(2.0 * np.pi * frequency * t), 0.04 / steps
-        (prepared,) = prepare((Record("steps", None, t, step * np.round(x / step), x, x, x),))
-        assert prepared.cycles is not None
-        true = 0.02 * np.sin(2.0 * np.pi * frequency * prepared.record.time)
-        kept.append(float(np.std(prepared.record.displacement - true)) / (step / np.sqrt(12.0)))
+        (cleaned,) = clean((Record("steps", None, t, step * np.round(x / step), x, x, x),))
+        assert cleaned.cycles is not None
+        true = 0.02 * np.sin(2.0 * np.pi * frequency * cleaned.record.time)
+        kept.append(float(np.std(cleaned.record.displacement - true)) / (step / np.sqrt(12.0)))
     assert np.median(kept) < 0.3
     assert np.mean(np.array(kept) < 0.5) >= 0.9
 
@@ -236,12 +237,12 @@ def test_a_clock_that_is_uneven_and_says_so_is_no_gap(draw: int, rng: Generator)
     time = time[(time > even.time[0]) & (time < even.time[-1])]
     channels = CubicSpline(even.time, np.stack([even.displacement, even.velocity, even.acceleration, even.force]).T)
     x, v, a, force = channels(time).T
-    (prepared,) = prepare((Record("uneven", None, time, x, v, a, force, np.zeros(time.size)),))
-    everything = np.ones(prepared.record.time.size, dtype=np.bool_)
-    check = check_residual(predict(damper, prepared, 5e-4), prepared, everything, NuisanceConfig())
+    (cleaned,) = clean((Record("uneven", None, time, x, v, a, force, np.zeros(time.size)),))
+    everything = np.ones(cleaned.record.time.size, dtype=np.bool_)
+    check = check_residual(predict(damper, cleaned, 5e-4), cleaned, everything, NuisanceConfig())
     assert np.sqrt(max(check.power, 0.0)) < 0.0025 * check.peak
-    assert prepared.average is not None
+    assert cleaned.average is not None
     # As for the fit, which folds a part of the record: its step may be another one.
-    fewer = replace(prepared.average.run, count=2)
-    part = replace(prepared, cycles=replace(fewer, period=fewer.period * (1.0 - 2.0 / prepared.average.points)))
+    fewer = replace(cleaned.average.run, count=2)
+    part = replace(cleaned, cycles=replace(fewer, period=fewer.period * (1.0 - 2.0 / cleaned.average.points)))
     assert np.size(displacement_variance(damper, part)) == pure_error(part.folded).single.size

@@ -1,4 +1,4 @@
-"""Prepared records: cleaned, without saturated ones, and split into samples that are fitted, that choose, and held out.
+"""Records as diagnose reads them: freed of the noise of displacement, temperature and voltage, with their cycles.
 
 Displacement and temperature are freed of noise without a filter of fixed corner. Noise of the displacement goes through
 a stiff oil into the force, and its second derivative looks like inertia. Where the motion repeats, cycles are averaged
@@ -11,16 +11,14 @@ its sensor. Noise of a constant voltage would look like steps of the voltage.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Rig
-from pzd.record import Array, Record, conditions, distinct, is_constant, sliced, voltage_scale
+from pzd.record import Array, Record, distinct, is_constant, sliced, voltage_scale
 from pzd.signals.average_cycle import AverageCycle, Motion
 from pzd.signals.cycles import Cycles, cycles, cycles_of, settled_cycles
 from pzd.signals.jumps import denoised_control
@@ -44,7 +42,7 @@ does not count."""
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedRecord:
+class CleanedRecord:
     """One record, cleaned, with its cycles."""
 
     record: Record
@@ -85,7 +83,7 @@ class PreparedRecord:
         return 0 if self.lead is None else self.lead.time.size - self.record.time.size
 
 
-def centred_on(prepared: Sequence[PreparedRecord], zero: float) -> tuple[PreparedRecord, ...]:
+def centred_on(cleaned: Sequence[CleanedRecord], zero: float) -> tuple[CleanedRecord, ...]:
     """Return the records with the displacement counted from another zero [m]."""
 
     def moved(record: Record) -> Record:
@@ -98,11 +96,11 @@ def centred_on(prepared: Sequence[PreparedRecord], zero: float) -> tuple[Prepare
             lead=None if p.lead is None else moved(p.lead),
             draws=tuple(moved(draw) for draw in p.draws),
         )
-        for p in prepared
+        for p in cleaned
     )
 
 
-def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
+def clean(records: Sequence[Record]) -> tuple[CleanedRecord, ...]:
     """Clean every record of one rig; several tests in one record become several records of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
@@ -114,25 +112,25 @@ def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
     )
 
 
-def _prepared(raw: Record, constant: bool) -> PreparedRecord:
+def _prepared(raw: Record, constant: bool) -> CleanedRecord:
     record = _denoised(raw, constant=constant)
     run = cycles(record.time, record.displacement)
     travel = np.abs(np.gradient(record.displacement))
     if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
         smoothed, draws = _smoothed_displacement(record)
-        return PreparedRecord(smoothed, None, None, constant, draws)
+        return CleanedRecord(smoothed, None, None, constant, draws)
     average = AverageCycle.of(record.time, record.displacement, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
         run = settled_cycles(run, record.time, record.force)
     kept = sliced(record, run.inside(record.time))
-    cleaned = _with_motion(kept, motion(kept.time))
+    moved = _with_motion(kept, motion(kept.time))
     if not constant:
-        return PreparedRecord(cleaned, None, None, constant)
+        return CleanedRecord(moved, None, None, constant)
     step = 1.0 / record.rate
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
-    lead = _with_lead(cleaned, early, motion(early))
-    return PreparedRecord(cleaned, run, lead, constant, _monte_carlo_motions(lead, average), average)
+    lead = _with_lead(moved, early, motion(early))
+    return CleanedRecord(moved, run, lead, constant, _monte_carlo_motions(lead, average), average)
 
 
 def _denoised(record: Record, *, constant: bool) -> Record:
@@ -159,22 +157,22 @@ def _with_motion(record: Record, motion: Motion) -> Record:
     return replace(record, displacement=motion[0], velocity=motion[1], acceleration=motion[2])
 
 
-def _with_lead(cleaned: Record, early: Array, motion: Motion) -> Record:
+def _with_lead(moved: Record, early: Array, motion: Motion) -> Record:
     """Put one cycle of the motion in front, with the first value of every other channel."""
 
     def longer(channel: Array | None) -> Array | None:
         return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
 
     return Record(
-        cleaned.name,
-        cleaned.setting,
-        np.concatenate([early, cleaned.time]),
-        np.concatenate([motion[0], cleaned.displacement]),
-        np.concatenate([motion[1], cleaned.velocity]),
-        np.concatenate([motion[2], cleaned.acceleration]),
-        np.concatenate([np.full(early.size, cleaned.force[0]), cleaned.force]),
-        longer(cleaned.voltage),
-        longer(cleaned.temperature),
+        moved.name,
+        moved.setting,
+        np.concatenate([early, moved.time]),
+        np.concatenate([motion[0], moved.displacement]),
+        np.concatenate([motion[1], moved.velocity]),
+        np.concatenate([motion[2], moved.acceleration]),
+        np.concatenate([np.full(early.size, moved.force[0]), moved.force]),
+        longer(moved.voltage),
+        longer(moved.temperature),
     )
 
 
@@ -293,141 +291,3 @@ def drift_note(largest: float) -> str:
     """Say by how much the force drifts [N], and what is not known for it; nothing without a drift."""
     known = "; the zero of the force drifts by up to {:.2g} N: that is taken out, and a preload is known no better"
     return known.format(largest) if largest else ""
-
-
-# --- Split into samples that are fitted, that choose, and that are held out
-#
-# Records are held out where a condition has three or more; of two, one is held out whole and the other is divided; a
-# lone record is divided by cycles, or where nothing repeats by segments. The same rig always splits the same way.
-
-
-TRAINING, VALIDATION, HELD_OUT = 0, 1, 2
-"""Roles of a sample: fitted; used to choose; seen by nothing but the final figures."""
-Roles = NDArray[np.int64]
-HoldOut = Literal["records", "cycles", "segments", "mixed"]
-
-ROLES_OF_LONE_RECORD = (TRAINING, VALIDATION, TRAINING, HELD_OUT, TRAINING, VALIDATION, TRAINING, HELD_OUT)
-"""Roles of the segments of a record that is alone in its condition and does not repeat."""
-ROLES_BESIDE_HELD_OUT = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION)
-"""Roles of the segments of such a record when another of its condition is held out."""
-MOVING_RECORDS_IN_GROUP = 4
-"""Fewest records with a moving voltage of which whole ones are held out.
-
-Reason: a step and a ramp do not stand for one another; fewer are each divided."""
-SAME_EXTREME = 0.05
-"""Records within this share of the rig's largest force, speed or displacement show the same as the one with it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Split:
-    """Role of every sample of every record, in the order of the records."""
-
-    roles: tuple[Roles, ...]
-    """(n,) role of each sample."""
-    held_out: tuple[str, ...]
-    """Names of the records that are held out, wholly or in part."""
-    hold_out: HoldOut
-    """What was held out."""
-
-
-def split(prepared: Sequence[PreparedRecord], voltage_within: float | None, temperature_within: float) -> Split:
-    """Split the records of one setting into roles.
-
-    Parameters
-    ----------
-    prepared : the records
-    voltage_within : largest spread of voltage inside one condition [V]; None for 2 % of the scale
-    temperature_within : largest spread of temperature inside one condition [degC]
-    """
-    number = {id(p.record): i for i, p in enumerate(prepared)}
-    found, moving = conditions([p.record for p in prepared], voltage_within, temperature_within)
-    groups = [condition.records for condition in found] + (
-        [moving] if len(moving) >= MOVING_RECORDS_IN_GROUP else [(record,) for record in moving]
-    )
-    extreme = {int(np.argmax(peaks)) for peaks in _peaks(prepared)}
-    roles: dict[int, Roles] = {}
-    kinds: set[HoldOut] = set()
-    for turn, group in enumerate(groups):
-        members = sorted((number[id(record)] for record in group), key=lambda i: _order(prepared[i]))
-        roles |= _roles_in_condition(_rotated(members, turn, extreme), prepared)
-        kinds.add("records" if len(group) > 1 else _hold_out_kind(prepared[members[0]]))
-    for i in _extremes_not_fitted(prepared, roles):
-        roles[i] = _divided_record(prepared[i], alone=True)
-        kinds.add(_hold_out_kind(prepared[i]))
-    ordered = tuple(roles[i] for i in range(len(prepared)))
-    names = (p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == HELD_OUT))
-    return Split(ordered, tuple(dict.fromkeys(names)), kinds.pop() if len(kinds) == 1 else "mixed")
-
-
-def _order(prepared: PreparedRecord) -> tuple[float, float, str]:
-    frequency = np.inf if prepared.cycles is None else round(prepared.cycles.frequency, 3)
-    return frequency, float(np.max(np.abs(prepared.record.velocity))), prepared.record.name
-
-
-def _peaks(prepared: Sequence[PreparedRecord]) -> list[Array]:
-    """Return the (r,) largest force, speed and displacement of every record: some effects show only there."""
-    channels = ("force", "velocity", "displacement")
-    return [np.array([np.max(np.abs(getattr(p.record, channel))) for p in prepared]) for channel in channels]
-
-
-def _extremes_not_fitted(prepared: Sequence[PreparedRecord], roles: Mapping[int, Roles]) -> set[int]:
-    """Return the records with the rig's largest force, speed or displacement where nothing near it is fitted."""
-    found = set()
-    for peaks in _peaks(prepared):
-        near = np.flatnonzero(peaks >= (1.0 - SAME_EXTREME) * peaks.max())
-        if not any(np.any(roles[int(i)] == TRAINING) for i in near):
-            found.add(int(np.argmax(peaks)))
-    return found
-
-
-def _hold_out_kind(prepared: PreparedRecord) -> HoldOut:
-    return "segments" if prepared.cycles is None else "cycles"
-
-
-def _rotated(members: list[int], turn: int, extreme: set[int]) -> list[int]:
-    """Rotate the members by `turn`, or by the least more that lets those with an extreme be fitted.
-
-    So over the conditions every kind of test is in every role.
-    """
-    count = len(members)
-    shifts = [[members[(turn + more + i) % count] for i in range(count)] for more in range(count)]
-    roles = _roles(count)
-    return max(shifts, key=lambda order: sum(i in extreme for i, r in zip(order, roles, strict=True) if r == TRAINING))
-
-
-def _roles(count: int) -> list[int]:
-    """Return the roles of so many records of one condition, in their order."""
-    role = [TRAINING] * count
-    role[1::4] = [HELD_OUT] * len(role[1::4])
-    chooses = slice(3, None, 4) if count > 3 else slice(2, 3)
-    role[chooses] = [VALIDATION] * len(role[chooses])
-    return role
-
-
-def _roles_in_condition(members: Sequence[int], prepared: Sequence[PreparedRecord]) -> dict[int, Roles]:
-    """Assign roles to the samples of the records of one condition, by the order of its members."""
-    if len(members) == 1:
-        return {members[0]: _divided_record(prepared[members[0]], alone=True)}
-    sizes = [prepared[i].record.time.size for i in members]
-    whole = {i: np.full(n, role) for i, n, role in zip(members, sizes, _roles(len(members)), strict=True)}
-    if len(members) == 2:
-        whole[members[0]] = _divided_record(prepared[members[0]], alone=False)
-    return whole
-
-
-def _divided_record(prepared: PreparedRecord, *, alone: bool) -> Roles:
-    time = prepared.record.time
-    if prepared.cycles is None:
-        pattern = np.array(ROLES_OF_LONE_RECORD if alone else ROLES_BESIDE_HELD_OUT)
-        return pattern[np.arange(time.size) * pattern.size // time.size]
-    return _roles_of_cycles(prepared.cycles.count, alone=alone)[np.clip(prepared.cycles.number(time), 0, None)]
-
-
-def _roles_of_cycles(count: int, *, alone: bool) -> Roles:
-    """Return the roles of `count` cycles: the last quarter is held out, the one before chooses, the rest is fitted."""
-    roles = np.full(count, TRAINING, dtype=np.int64)
-    held_out = max(1, count // 4) if alone else 0
-    chooses = max(1, count // 4) if count - held_out >= 2 else 0
-    roles[count - held_out :] = HELD_OUT
-    roles[count - held_out - chooses : count - held_out] = VALIDATION
-    return roles
