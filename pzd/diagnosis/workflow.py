@@ -5,34 +5,27 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
 
 import numpy as np
 
 from pzd.artefacts import (
     Diagnosed,
     Diagnosis,
-    Gap,
     Identified,
     NextTest,
     ParameterRow,
-    Ranked,
     Rig,
-    Value,
     base_of,
     identified_damper,
 )
 from pzd.artefacts.diagnosis import Verdict
-from pzd.damper.effect import NODE_VOLTAGES, Parameter
 from pzd.damper.effects import library, nameable
-from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 from pzd.damper.fitted_laws import seal
 from pzd.damper.model import Damper
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis import next_test, thresholds
 from pzd.diagnosis.adoption import Adoption, by_criterion_if_better
-from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.cleaned_records import (
     CleanedRecord,
     centred_on,
@@ -44,14 +37,15 @@ from pzd.diagnosis.cleaned_records import (
 )
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
-from pzd.diagnosis.fit.least_squares import base_half_widths, plain_fit, polished, refit, standard_errors
+from pzd.diagnosis.entries import base_parameters, held_out_gap, may_be_none, parameters_of, ranking_of
+from pzd.diagnosis.fit.least_squares import polished, refit
 from pzd.diagnosis.fit.problem import Budget
-from pzd.diagnosis.gap import ResidualCheck, held_out_criterion, probability_of_noise, regions, visible_gap
+from pzd.diagnosis.gap import ResidualCheck, probability_of_noise, regions, visible_gap
 from pzd.diagnosis.hypotheses import hypotheses
 from pzd.diagnosis.mains import with_hum
 from pzd.diagnosis.next_test import OperatingEnvelope
 from pzd.diagnosis.predictive_search import improves
-from pzd.diagnosis.roles import TRAINING, split
+from pzd.diagnosis.roles import split
 from pzd.diagnosis.search.acceptance import Selection
 from pzd.diagnosis.search.candidates import candidate, converged, has_name
 from pzd.diagnosis.search.determination import first_undetermined
@@ -79,18 +73,7 @@ from pzd.diagnosis.verdict import (
     with_parts_told,
 )
 from pzd.fit.cross_validation import predicts_worse
-from pzd.fit.intervals import LEVEL
-from pzd.identification.bingham_fit import Bingham
-from pzd.identification.condition import misses, parameter_row
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.trust import (
-    NOT_CONVERGED,
-    OF_THE_MODEL,
-    PARAMETER_NAMES,
-    ParameterEvidence,
-    parameter_scales,
-    stiffness_veto,
-)
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
@@ -111,20 +94,21 @@ def diagnose_setting(
     jobs: int,
 ) -> Diagnosed:
     """Diagnose one setting; parameters and result are those of `pzd.diagnosis.stage.diagnose`."""
-    search = partial(_searched, diagnose, identify, stand, rig, control, setting, jobs)
+    asked = _Asked(diagnose, identify, stand, rig, control, setting, jobs)
     rows = tuple(row for row in identified.rows if row.setting == setting)
     if identified.knees.law_of(setting) != "knee":
-        return search(base_of(identified.rows, setting), rows).hand_on()
+        return _searched(asked, base_of(identified.rows, setting), rows).hand_on()
     if (suffices := knee_suffices(identified, setting, diagnose)) is not None:
         return suffices
     law = next(row for row in identified.knees.laws if row.setting == setting)
-    bingham = search(base_of(identified.rows, setting), rows) if identify.law == "auto" else None
+    bingham = _searched(asked, base_of(identified.rows, setting), rows) if identify.law == "auto" else None
     # What the knee law misses may be an effect beside T0, C and k, in whose place the knee stands.
     if bingham is not None and bingham.verdict != "unexplained":
         found = bingham.hand_on()
         if _predicts_far_better(found, law.W_s_knee):
             return _with_law(found, INSTEAD_OF_KNEE)
-    beside = search(identified_damper(identified, setting), knee_parameters(identified.knees.of(setting))).hand_on()
+    knees = knee_parameters(identified.knees.of(setting))
+    beside = _searched(asked, identified_damper(identified, setting), knees).hand_on()
     reached = beside.diagnosis.prediction
     if bingham is not None and beside.diagnosis.verdict == "unexplained":
         found = bingham.hand_on()
@@ -147,6 +131,19 @@ def _with_law(diagnosed: Diagnosed, law: str) -> Diagnosed:
 
 
 @dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is diagnosed: the records of one setting, and what the config says of them."""
+
+    diagnose: DiagnoseConfig
+    identify: IdentifyConfig
+    stand: RigConfig
+    rig: Rig
+    control: Control
+    setting: str | None
+    jobs: int
+
+
+@dataclass(frozen=True, eq=False)
 class _Searched:
     """What a search beside one law of the element names, and what to ask for the damper that is handed on."""
 
@@ -155,20 +152,11 @@ class _Searched:
     """Looks for what predicts where the gap has no name, which takes longer than the naming; gives the whole."""
 
 
-def _searched(
-    diagnose: DiagnoseConfig,
-    identify: IdentifyConfig,
-    stand: RigConfig,
-    rig: Rig,
-    control: Control,
-    setting: str | None,
-    jobs: int,
-    identified: Damper,
-    rows: tuple[ParameterRow, ...],
-) -> _Searched:
+def _searched(asked: _Asked, identified: Damper, rows: tuple[ParameterRow, ...]) -> _Searched:
     """Search beside the damper that identify found, with T0, C and k of each condition in rows."""
-    records, saturated = unsaturated_records(rig, setting)
-    records, drift = without_drift(rig, records)
+    diagnose, identify, control, setting = asked.diagnose, asked.identify, asked.control, asked.setting
+    records, saturated = unsaturated_records(asked.rig, setting)
+    records, drift = without_drift(asked.rig, records)
     recorded = clean(records)
     # Effects are fitted about the middle of the stroke, and written with the displacement as recorded.
     cleaned = centred_on(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
@@ -176,9 +164,9 @@ def _searched(
     baseline = identified.about(zero).moved(-zero)
     cleaned = with_hum(cleaned, baseline)
     budget, law = Budget(diagnose.most_evaluations), tuple(baseline.effects)
-    campaign = Campaign(cleaned, roles, diagnose.nuisance, jobs, budget, law)
+    campaign = Campaign(cleaned, roles, diagnose.nuisance, asked.jobs, budget, law)
     voltages = [row.voltage_V for row in baseline.base if row.voltage_V is not None]
-    envelope = next_test.operating_envelope(stand.limits, recorded, voltages)
+    envelope = next_test.operating_envelope(asked.stand.limits, recorded, voltages)
 
     def without(diagnosis: Diagnosis) -> _Searched:
         return _Searched(diagnosis.verdict, lambda: Diagnosed(diagnosis, identified, identified, rows))
@@ -188,15 +176,15 @@ def _searched(
     if insufficient_data(campaign):
         return without(insufficient_data_diagnosis(recorded, envelope))
     judged = _judged(campaign, baseline, diagnose, control.unit)
-    judged = _with_zeros_of_tests(judged, baseline, diagnose, control.unit)
-    judged = _with_seal(judged, baseline, diagnose, control.unit)
-    judged = _with_one_alone(judged, baseline, diagnose, control.unit)
+    judged = _with_zeros_of_tests(judged)
+    judged = _with_seal(judged)
+    judged = _with_one_alone(judged)
 
     def hand_on() -> Diagnosed:
         campaign, validation = judged.campaign, judged.validation
-        adoption, decision = _concluded(judged, baseline, diagnose, control.unit)
+        adoption, decision = _concluded(judged)
         adoption = by_criterion_if_better(adoption, validation, diagnose.force)
-        support = support_of(adoption, validation, (*decision.alike, *_may_be_none(adoption.selection, control)))
+        support = support_of(adoption, validation, (*decision.alike, *may_be_none(adoption.selection, control)))
         decision = with_parts_told(decision, support)
         selection, prediction = adoption.selection, adoption.prediction(validation)
         plain_selection = judged.without_seal or selection
@@ -257,13 +245,13 @@ def _predicts_far_better(one: Diagnosed, criterion: float | None) -> bool:
     return found.W_s <= thresholds.BETTER_THAN_KNEE * criterion
 
 
-def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs: int) -> Selection:
+def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig) -> Selection:
     """Select effects; with T0, C and k at each temperature where a law of the temperature turns out wrong.
 
     The drift knows T0 and C alone. Where k follows the temperature too the gains of the tests do it in its place, or
     something is left; what was measured at each temperature needs no law.
     """
-    found = select_effects(campaign, baseline, config, jobs)
+    found = select_effects(campaign, baseline, config, campaign.jobs)
     drifts = tuple(name for name in found.adopted if library()[name].place == "material" and name not in config.force)
     if not drifts or len(baseline.base) == len(rows_per_voltage(baseline.base)):
         return found
@@ -271,7 +259,7 @@ def _selected(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, jobs
     if trend is None and left < config.visible:
         return found
     forbidding = config.model_copy(update={"forbid": (*config.forbid, *drifts)})
-    by_rows = select_effects(campaign, baseline, forbidding, jobs, rows_by_temperature=True)
+    by_rows = select_effects(campaign, baseline, forbidding, campaign.jobs, rows_by_temperature=True)
     most = max(left, config.visible) if trend else thresholds.ROWS_INSTEAD * left
     less = by_rows.final_evidence.gap(by_rows.fitted) <= most
     return by_rows if less and nuisance_trend(campaign, by_rows.fitted.damper, config) is None else found
@@ -282,6 +270,11 @@ class _Judged:
     """A campaign, and what is judged of it."""
 
     campaign: Campaign
+    baseline: Damper
+    """The damper without effects."""
+    config: DiagnoseConfig
+    unit: str
+    """Of the control signal, for the reason."""
     validation: CrossValidation
     conclusion: Conclusion
     zeros: str = ""
@@ -292,19 +285,19 @@ class _Judged:
 
 def _judged(campaign: Campaign, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
     """Select effects, and judge them."""
-    selected = _selected(campaign, baseline, config, campaign.jobs)
+    selected = _selected(campaign, baseline, config)
     validation = cross_validation_of(campaign, baseline, config.visible)
-    return _Judged(campaign, validation, judge(selected, validation, config, unit))
+    return _Judged(campaign, baseline, config, unit, validation, judge(selected, validation, config, unit))
 
 
-def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+def _with_zeros_of_tests(first: _Judged) -> _Judged:
     """Judge again where an offset of each test, larger than most stands have, takes much of what has no name.
 
     A load cell is zeroed by hand, warms, or is made for ten times the force. No law gives a force that is constant in
     every test and another one in each, so that such a gap names nothing of the damper. The first judgement stands where
     nothing is explained by it.
     """
-    campaign, (adoption, decision) = first.campaign, first.conclusion
+    campaign, config, (adoption, decision) = first.campaign, first.config, first.conclusion
     if decision.verdict != "unexplained" or not config.nuisance.offset:
         return first
     damper, allowed = adoption.selection.fitted.damper, max(thresholds.LARGEST_ZERO, config.nuisance.offset)
@@ -314,21 +307,21 @@ def _with_zeros_of_tests(first: _Judged, baseline: Damper, config: DiagnoseConfi
     zeros = np.array([float(np.mean(check.nuisances[check.wanted])) for check in checks])
     spread = rms(zeros / np.array([check.peak for check in checks]))
     wider = campaign.with_offset(float(np.clip(spread, config.nuisance.offset, allowed)))
-    again = _judged(wider, baseline, config, unit)
+    again = _judged(wider, first.baseline, config, first.unit)
     if again.conclusion[1].verdict == "unexplained":
         return first
     told = f"; the zero of the load cell differs from test to test, by {np.ptp(zeros):.2g} N in all"
     return replace(again, zeros=told)
 
 
-def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+def _with_seal(first: _Judged) -> _Judged:
     """Judge again beside the friction of a seal on the rod, where effects leave a little that has no name.
 
     T0 lies behind the oil spring and turns round with the flow; a seal turns round with the rod. That is no effect that
     anybody asks for, and beside one that is missing it would leave the whole without a name. The first judgement stands
     where the effects have none with it either, or kept-back tests are predicted worse.
     """
-    adoption, decision = first.conclusion
+    config, (adoption, decision) = first.config, first.conclusion
     selection, checks = adoption.selection, first.campaign.checks
     left = visible_gap(checks(selection.fitted.damper))
     if decision.verdict != "unexplained" or config.force or first.campaign.law or left > thresholds.SEAL_LEAVES:
@@ -351,7 +344,7 @@ def _with_seal(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
     sizes = visible_gap(checks(selection.baseline.damper)), visible_gap(beside)
     if leaves_too_much(sizes, probability_of_noise(beside), config):
         return first
-    again = _judged(campaign, rubbed(baseline), config, unit)
+    again = _judged(campaign, rubbed(first.baseline), config, first.unit)
     found, named = again.conclusion
     if named.verdict not in ("named", "ambiguous") or not {*found.selection.adopted} <= sure:
         return first
@@ -372,13 +365,13 @@ def _seal_note(damper: Damper, law: Sequence[str]) -> str:
 ALONE = "nothing is left with it, and nothing else explains the tests"
 
 
-def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> _Judged:
+def _with_one_alone(first: _Judged) -> _Judged:
     """Judge again with an effect that is named where alone it leaves nothing, if what is missing has no other name.
 
     Such a law may take part of much that is missing, but the whole of little. Another one of them that leaves nothing
     as well is its rival.
     """
-    adoption, decision = first.conclusion
+    config, (adoption, decision) = first.config, first.conclusion
     if decision.verdict != "unexplained" or config.force:
         return first
     evidence, plain = adoption.selection.initial_evidence, adoption.selection.baseline
@@ -387,7 +380,7 @@ def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, un
     tried = [converged(whole, plain, candidate(whole, plain, effect)) for effect in wanted]
     closing = [each for each in tried if not evidence.gap_is_significant(each.fitted, config)]
     for each in sorted(closing, key=lambda c: c.delta_bic):
-        again = _judged_with(first, (each.effect,), baseline, config, unit)
+        again = _judged_with(first, (each.effect,))
         if again is None:
             continue
         alike = [c.effect for c in closing if c is not each and c.delta_bic - each.delta_bic < config.rival_bic]
@@ -400,11 +393,12 @@ def _with_one_alone(first: _Judged, baseline: Damper, config: DiagnoseConfig, un
     return first
 
 
-def _concluded(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: str) -> Conclusion:
+def _concluded(first: _Judged) -> Conclusion:
     """Conclude; and where what was added for its prediction leaves nothing, judge it by itself.
 
     It came in as what predicts, beside whatever stood there first; without that it may be all that is missing.
     """
+    config = first.config
     adoption, decision = concluded = conclude(first.conclusion, first.validation, config)
     selection, named = adoption.selection, nameable()
     names = selection.adopted
@@ -415,32 +409,27 @@ def _concluded(first: _Judged, baseline: Damper, config: DiagnoseConfig, unit: s
         and all(name in named or library()[name].named_alone for name in names)
         and not selection.initial_evidence.gap_is_significant(selection.fitted, config)
     ):
-        again = _judged_with(first, names, baseline, config, unit)
+        again = _judged_with(first, names)
         if again is not None:
             return conclude(again, first.validation, config)
     return concluded
 
 
-def _judged_with(
-    first: _Judged, names: tuple[str, ...], baseline: Damper, config: DiagnoseConfig, unit: str
-) -> Conclusion | None:
+def _judged_with(first: _Judged, names: tuple[str, ...]) -> Conclusion | None:
     """Judge some effects by themselves: they leave nothing, the tests determine them, and they predict those kept back.
 
     Parameters
     ----------
     first : judgement without them
     names : of the effects
-    baseline : damper without effects
-    config : thresholds, forced and forbidden effects
-    unit : of the control signal, for the reason
 
     Returns
     -------
     what is adopted, and the verdict on it; None where these do not explain the tests
     """
-    only = config.model_copy(update={"force": names, "most_effects": len(names)})
-    selected = select_effects(first.campaign, baseline, only, first.campaign.jobs, forced_because=ALONE)
-    adoption, decision = judge(selected, first.validation, only, unit)
+    only = first.config.model_copy(update={"force": names, "most_effects": len(names)})
+    selected = select_effects(first.campaign, first.baseline, only, first.campaign.jobs, forced_because=ALONE)
+    adoption, decision = judge(selected, first.validation, only, first.unit)
     kept = adoption.selection
     before, after = adoption.baseline_error.criterion, adoption.error.criterion
     if decision.verdict == "unexplained" or {*kept.adopted} != {*names} or before is None or after is None:
@@ -509,197 +498,3 @@ def _next_test(
     offset = campaign.offset(final.moved(-zero))
     errors = adoption.error, adoption.interpolation_error
     return next_test.intermediate_voltage_test(final, offset, errors, validation, recorded, envelope, temperature)
-
-
-# --- Entries of the files: ranking, parameters with intervals, and the held-out gap
-
-
-def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
-    """List every candidate at the step that decided on it, best first, adopted ones in front, as they are handed on.
-
-    `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in; its standard error is that of the
-    scatter between tests.
-    """
-    rows: dict[str, Ranked] = {}
-    for step in selection.steps:
-        for c in step.tried:
-            if step.tried is not selection.deciding(c.effect):
-                continue
-            reason = "does not pay" if c.delta_bic > 0.0 else "explains less"
-            reason = selection.reasons.get(c.effect, reason if c.searched else "promises too little to be searched for")
-            # A later step, an exchange or the last descent moved what was adopted from where its own step left it.
-            damper = (selection.fitted if c.effect in selection.adopted else c.fitted).damper
-            values: dict[str, Any] = dict(damper.effects[c.effect])
-            left, error = evidence.criterion(damper)
-            rows[c.effect] = Ranked(
-                effect=c.effect,
-                gap_after=left,
-                gap_standard_error=error,
-                delta_bic=round(c.delta_bic, 3),
-                at_voltage_V=values.pop(NODE_VOLTAGES, None),
-                parameters=values,
-                reason="rival" if c.effect in selection.rivals else reason,
-            )
-    # Candidates that explain nothing tie but for rounding, which differs between machines: there the name decides.
-    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, round(r.delta_bic), r.effect)))
-
-
-def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str, Value]]:
-    """Return the parameters of the adopted effects with 95 % intervals, in units of this control signal."""
-    damper, errors = selection.fitted.damper, standard_errors(selection.fitted)
-    found: dict[str, dict[str, Value]] = {}
-    for name in selection.adopted:
-        nodes = damper.effects[name].get(NODE_VOLTAGES)
-        for parameter in library()[name].parameters:
-            mine = [
-                (u.value_in(damper), float(error))
-                for u, error in zip(selection.fitted.unknowns, errors, strict=True)
-                if (u.effect, u.parameter.name) == (name, parameter.name)
-            ]
-            found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes, control)
-    for (name, parameter_name), sign in CONSTANT_FORCES.items():
-        if name in found:
-            found[name][parameter_name] = _of_seal_or_valve(found[name][parameter_name], damper, sign)
-    if {"accumulator", "preload_offset"} <= found.keys():
-        found["accumulator"], found["preload_offset"] = _of_any_gas(found["accumulator"], found["preload_offset"])
-    return found
-
-
-def _may_be_none(selection: Selection, control: Control) -> list[str]:
-    """Return the adopted effects whose strength, the first parameter, may be none by the interval that is told."""
-    strengths = {name: library()[name].parameters[0] for name in selection.adopted}
-    found = parameters_of(selection, control)
-    return [name for name, p in strengths.items() if found[name][p.name].may_be(p.neutral)]
-
-
-def _of_any_gas(gas: dict[str, Value], preload: dict[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
-    """Return a gas and the preload beside it with intervals that hold those of a gas of any exponent.
-
-    What is constant of the one the other takes up: these tests tell no exponent.
-    """
-    force, length, beside = gas["F_g"], gas["L"], preload["F_0"]
-    if not (isinstance(force.value, float) and isinstance(length.value, float) and isinstance(beside.value, float)):
-        return gas, preload
-    factors = [(1.0, 1.0), *(other_gas(exponent) for exponent in EXPONENTS)]
-    of_force = [(factor - 1.0) * force.value for factor, _ in factors]
-    of_length = [(factor - 1.0) * length.value for _, factor in factors]
-    return (
-        {"F_g": _widened(force, of_force), "L": _widened(length, of_length)},
-        {"F_0": _widened(beside, of_force)},
-    )
-
-
-def _widened(value: Value, moves: Sequence[float]) -> Value:
-    """Return a value with an interval that holds itself moved by each of some amounts."""
-    low, high = value.low95, value.high95
-    if not (isinstance(low, float) and isinstance(high, float)):
-        return value
-    return value.model_copy(update={"low95": low + min(moves), "high95": high + max(moves)})
-
-
-CONSTANT_FORCES = {("preload_offset", "F_0"): 1.0, ("accumulator", "F_g"): -1.0}
-"""Forces that do not change with the motion, by effect and parameter, with their sign in the force of the damper."""
-
-
-def _of_seal_or_valve(value: Value, damper: Damper, sign: float) -> Value:
-    """Return a constant force with an interval that holds it also where the friction is no asymmetric one.
-
-    A friction T0 (1 + alpha sign F) has a mean of alpha T0, which one the same both ways, as of a seal, leaves to the
-    constant force: at one T0 no test tells them apart.
-    """
-    alpha = damper.effects.get("asymmetry", {}).get("alpha", 0.0)
-    if not isinstance(alpha, float):
-        return value
-    return _widened(value, (0.0, sign * alpha * min(row.T0_N for row in damper.base)))
-
-
-def _value(
-    estimates: Sequence[tuple[float, float]],
-    parameter: Parameter,
-    nodes: float | tuple[float, ...] | None,
-    control: Control,
-) -> Value:
-    """Return a parameter with its 95 % interval clipped to its limits.
-
-    Parameters
-    ----------
-    estimates : value and standard error, one per voltage or a single one
-    parameter : its unit and limits
-    nodes : the voltages [V]; None for a single value
-    control : whose unit stands in the place of V
-    """
-    unit = control.own_unit(parameter.unit)
-    middle = tuple(value for value, _ in estimates)
-    low = tuple(max(value - LEVEL * error, parameter.low) for value, error in estimates)
-    high = tuple(min(value + LEVEL * error, parameter.high) for value, error in estimates)
-    if not isinstance(nodes, tuple):
-        return Value(value=middle[0], low95=low[0], high95=high[0], unit=unit)
-    return Value(value=middle, low95=low, high95=high, unit=unit, at_voltage_V=nodes)
-
-
-DOUBTS: dict[Verdict, str] = {
-    "unexplained": f"something is still missed: {OF_THE_MODEL}",
-    "ambiguous": "a rival effect would leave other values",
-}
-"""Why no row is `ok` under a verdict."""
-SHOWN = 1.0
-"""Share of the force that a parameter moves, for its status: what the tests do not show has a wide interval here."""
-
-
-def base_parameters(selection: Selection, verdict: Verdict, setting: str | None) -> tuple[ParameterRow, ...]:
-    """Return T0, C and k fitted with the effects, judged by their 95 % intervals as identify judges its own.
-
-    An interval allows for noise, for the sensors' priors, and for how far the tests disagree; it holds the damper's own
-    parameters where the adopted effects are all that there is.
-
-    Parameters
-    ----------
-    selection : effects adopted
-    verdict : of the diagnosis
-    setting : of the rig's settings, the one in use
-    """
-    fitted, whole = selection.fitted, selection.final_evidence.whole
-    compared = [(o.base_row, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
-    rows = []
-    doubt = DOUBTS.get(verdict) if fitted.converged else NOT_CONVERGED
-    half_widths = base_half_widths(fitted, whole.coordinates)
-    for place, (row, widths) in enumerate(zip(fitted.damper.base, half_widths, strict=True)):
-        mine = [(m, f) for at, m, f in compared if at == place] or [(m, f) for _, m, f in compared]
-        measured = np.concatenate([m for m, _ in mine])
-        residuals = measured - np.concatenate([f for _, f in mine])
-        parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
-        scales = parameter_scales(parameters, widths, rms(measured), whole.scales.speed).tolist()
-        stiffest = 1.0 / (scales[2] + float(widths[2])) if scales[2] <= widths[2] else np.inf
-        evidence = [
-            ParameterEvidence(name, scale, width, width, SHOWN, veto, doubt)
-            for name, scale, width, veto in zip(
-                PARAMETER_NAMES, scales, widths.tolist(), (None, None, stiffness_veto(stiffest)), strict=True
-            )
-        ]
-        labels = (setting, row.voltage_V, row.temperature_degC)
-        rows.append(parameter_row(labels, parameters, widths, evidence, misses(residuals, measured), stiffest))
-    return tuple(rows)
-
-
-def held_out_gap(selection: Selection, validation: CrossValidation | None = None, plain: Evidence | None = None) -> Gap:
-    """Compute criterion (4) on the held-out samples before and after, with nuisances at their prior mean.
-
-    Both dampers are fitted to the training samples alone.
-
-    Parameters
-    ----------
-    selection : effects adopted, and the evidence whose first half trains
-    validation : the tests, where the adopted damper is fitted by criterion (4); None where it is by likelihood
-    plain : evidence for the fit of the simple model, where the selection is beside another law
-    """
-    campaign, training = selection.initial_evidence.campaign, (plain or selection.initial_evidence).halves[0]
-    baseline = plain_fit(training).damper
-    before = held_out_criterion(campaign.held_out_checks(baseline), campaign.split)
-    if not selection.adopted:
-        return before
-    not_training = [~mask for mask in campaign.in_role(TRAINING)]
-    found = None if validation is None else validation.fit_by_criterion(selection.fitted.damper, not_training)
-    training = selection.final_evidence.halves[0]
-    adopted = found[1] if found else refit(training, selection.fitted.damper)
-    after = held_out_criterion(campaign.held_out_checks(adopted.damper), campaign.split)
-    return after.model_copy(update={"before": before.before})

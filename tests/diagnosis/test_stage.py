@@ -18,11 +18,11 @@ from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.cleaned_records import clean
+from pzd.diagnosis.entries import parameters_of
 from pzd.diagnosis.fit.prediction import predict
 from pzd.diagnosis.gap import check_residual
 from pzd.diagnosis.roles import HELD_OUT, TRAINING, VALIDATION, split
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.workflow import parameters_of
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
