@@ -174,7 +174,7 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     problem = Problem(
         tuple(by_noise),
         damper.base,
-        _scales(by_noise, cleaned, damper),
+        scales_of([o.peak for o in by_noise], cleaned, damper),
         reference,
         frozenset(name for name, values in damper.effects.items() if NODE_VOLTAGES in values),
         campaign.budget,
@@ -222,21 +222,29 @@ def _shown_by_tests(problem: Problem, damper: Damper, prior: NuisanceConfig) -> 
     return NuisanceConfig(offset=offset * prior.offset, gain=gain * prior.gain, delay_s=delay * prior.delay_s)
 
 
-def _scales(observed: Sequence[WeightedRecord], cleaned: Sequence[CleanedRecord], damper: Damper) -> Scales:
-    """Return the magnitudes by which effect parameters are scaled."""
-    records, peaks = [p.record for p in cleaned], [o.peak for o in observed]
+def scales_of(peaks: Sequence[float], cleaned: Sequence[CleanedRecord], damper: Damper, zero: float = 0.0) -> Scales:
+    """Return the magnitudes by which parameters of effects are scaled.
+
+    Parameters
+    ----------
+    peaks : largest force of each test [N]
+    cleaned : the tests
+    damper : T0, C and k at their conditions
+    zero : displacement at the middle of the stroke [m]
+    """
+    records = [p.record for p in cleaned]
 
     def largest(channels: Iterable[Array]) -> float:
-        return max(float(np.max(np.abs(channel))) for channel in channels)
+        return max(*(float(np.max(np.abs(channel))) for channel in channels), float(np.finfo(float).tiny))
 
-    speed = largest(r.velocity for r in records)
+    force, speed = largest(np.array(peaks)[:, None]), largest(r.velocity for r in records)
     return Scales(
-        max(peaks),
+        force,
         min(peaks),
         speed,
-        largest(r.displacement for r in records),
+        largest(r.displacement - zero for r in records),
         largest(r.acceleration for r in records),
-        max(float(np.median([row.C_Ns_per_m for row in damper.base])), UNSEEN[0] * max(peaks) / speed),
+        max(float(np.median([row.C_Ns_per_m for row in damper.base])), UNSEEN[0] * force / speed),
         voltage_scale(records),
         flow_of(damper, cleaned),
     )

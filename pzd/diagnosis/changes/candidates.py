@@ -238,7 +238,7 @@ class FirstState:
 
     def _move_effect(self, effects: dict[str, dict[str, float | tuple[float, ...]]], c: Coordinate, x: float) -> None:
         parameter = known_parameter(c.name, c.parameter)
-        own = effects.setdefault(c.name, {p.name: p.neutral for p in known_effect(c.name).parameters})
+        own = effects.setdefault(c.name, {p.name: p.neutral for p in known()[c.name].parameters})
         present = own.get(c.parameter, parameter.neutral)
         if isinstance(present, tuple):
             own[c.parameter] = values_by_control(c, present, x)
@@ -285,15 +285,9 @@ def without_laws(damper: Damper) -> Damper:
     return damper.without_effects(*fitted_laws())
 
 
-def known_effect(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN201
-    """Return an effect of the library or a fitted law by name."""
-    return known().get(name) or fitted_laws()[name]
-
-
 def known_parameter(name: str, parameter: str) -> Parameter:
     """Return a parameter of an effect."""
-    found: Parameter = known_effect(name).parameter(parameter)
-    return found
+    return known()[name].parameter(parameter)
 
 
 def parameter_value(c: Coordinate, x: float) -> float:
@@ -387,7 +381,7 @@ def knows_temperature(damper: Damper) -> bool:
 def _absent(first: FirstState, name: str) -> Candidate:
     """Return an effect that is newly there, with its starting values."""
     coordinates = []
-    for p in known_effect(name).parameters:
+    for p in known()[name].parameters:
         scale = p.search.scale(first.scales) or 1.0
         low, high = p.low / scale, p.high / scale
         if p.search.logarithmic:
@@ -402,7 +396,7 @@ def _absent(first: FirstState, name: str) -> Candidate:
     def searched(c: Coordinate, x: float) -> float:
         return float(np.log(max(x, 1.0 / BOUND))) if c.logarithmic else x - c.start / c.scale
 
-    effect, gas = known_effect(name), force_at_rest(first.damper)
+    effect, gas = known()[name], force_at_rest(first.damper)
     unscaled = all(c.logarithmic for c in coordinates)
     faint = (FAINT,) if unscaled and len(coordinates) == 1 else ()
     several = unscaled and len(coordinates) > 1
@@ -439,7 +433,7 @@ def _closer(starts: Sequence[float]) -> tuple[float, ...]:
 
 
 def _flexible(name: str) -> bool:
-    effect = known_effect(name)
+    effect = known()[name]
     return effect.imitates or effect.never_named is not None
 
 
@@ -450,7 +444,7 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
     there beside what the first state has adds to it.
     """
     own, coordinates, added, without = first.damper.effects[name], [], [], []
-    for p in known_effect(name).parameters:
+    for p in known()[name].parameters:
         value = own.get(p.name, p.neutral)
         if p.optional and not np.any(value):
             without.append(p.name)

@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 
 from pzd.artefacts.changes import Change, Numbers, Unchanged, holds_what_was
+from pzd.damper.confounders import known
 from pzd.damper.effect import NODE_VOLTAGES
 from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.changes.candidates import (
@@ -16,7 +17,6 @@ from pzd.diagnosis.changes.candidates import (
     Coordinate,
     Of,
     element_of,
-    known_effect,
     known_parameter,
     nearest_node,
     parameter_value,
@@ -128,14 +128,14 @@ def unchanged_quantities(found: Findings, best: Fitted) -> tuple[Unchanged, ...]
 
     No T0 that is not told from 0 where a branch holds the friction: none of the damper would seem to be there.
     """
-    known = Uncertainty(found.search, best)
-    branched = any(known_effect(name).place == "branch" for name in found.first.damper.effects)
+    uncertainty = Uncertainty(found.search, best)
+    branched = any(known()[name].place == "branch" for name in found.first.damper.effects)
     shown: dict[tuple[str, str], Unchanged] = {}
-    for candidate in filter(known.tells, found.search.candidates):
+    for candidate in filter(uncertainty.tells, found.search.candidates):
         if candidate.key[0] in shown:
             continue
         (c,) = candidate.coordinates
-        if_changed = known.if_changed(candidate)
+        if_changed = uncertainty.if_changed(candidate)
         most = found.diagnose.visible / if_changed.force if if_changed.force > 0.0 else np.inf
         if most > SHOWN or LEVEL * if_changed.alone > most or abs(if_changed.value) > most:
             continue

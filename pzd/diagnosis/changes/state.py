@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,16 +11,13 @@ from pzd.artefacts.identified import identified_damper
 from pzd.damper.effect import Scales
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import Damper
-from pzd.diagnosis.campaign import flow_of
+from pzd.diagnosis.campaign import scales_of
 from pzd.diagnosis.cleaned_records import CleanedRecord, clean, unsaturated_records
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, Record, mid_stroke, voltage_scale
 from pzd.rig.config import RigConfig
-
-SOFTEST = 0.1
-"""Least C by which effect parameters are scaled [largest force over largest speed]: a friction damper has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,23 +58,8 @@ class State:
 
     def scales(self) -> Scales:
         """Return the magnitudes by which effect parameters are scaled."""
-        zero = mid_stroke(r.displacement for r in self.records)
         peaks = [float(np.max(np.abs(r.force))) for r in self.records]
-
-        def largest(values: Sequence[float]) -> float:
-            return max(*values, float(np.finfo(float).tiny))
-
-        speed = largest([float(np.max(np.abs(r.velocity))) for r in self.records])
-        return Scales(
-            largest(peaks),
-            min(peaks),
-            speed,
-            largest([float(np.max(np.abs(r.displacement - zero))) for r in self.records]),
-            largest([float(np.max(np.abs(r.acceleration))) for r in self.records]),
-            max(float(np.median([row.C_Ns_per_m for row in self.damper.base])), SOFTEST * largest(peaks) / speed),
-            self.voltage_scale,
-            flow_of(self.damper, self.cleaned),
-        )
+        return scales_of(peaks, self.cleaned, self.damper, mid_stroke(r.displacement for r in self.records))
 
 
 def diagnosed_state(
