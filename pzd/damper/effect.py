@@ -62,6 +62,17 @@ Need = Literal["voltage", "temperature"]
 """What must vary inside a test."""
 
 
+LARGEST_FORCE = 1.0e8
+"""Of any damper [N].
+
+Reason: ten times that of the largest ones, in bridges; a value beyond is in another unit."""
+LARGEST_DAMPING = 1.0e10
+"""Of any damper [N s/m]: the largest force at 10 mm/s."""
+LARGEST_SQUARE = 1.0e12
+"""Force over the square of the speed of any damper [N s2/m2]: the largest force at 10 mm/s."""
+STIFFEST_BESIDE = 1.0e11
+"""Of any spring beside the element [N/m]: the largest force after 1 mm."""
+
 FLOWING_WELL = (0.1, 0.9)
 """Shares of the way from T0 to the largest force of a condition between which a change of the flow shows well.
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import NODE_VOLTAGES, Effect, EffectValues
+from pzd.damper.effect import LARGEST_DAMPING, LARGEST_FORCE, NODE_VOLTAGES, Effect, EffectValues
 from pzd.damper.effects import library
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
@@ -18,7 +18,7 @@ from pzd.schema.model import Frozen
 Effects = dict[str, dict[str, float | tuple[float, ...]]]
 """Parameters of each effect, by its name and theirs."""
 
-PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (0.0, 1e9), "k_N_per_m": (1.0, math.inf)}
+PHYSICAL = {"T0_N": (0.0, LARGEST_FORCE), "C_Ns_per_m": (0.0, LARGEST_DAMPING), "k_N_per_m": (1.0, math.inf)}
 """Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge; no friction, no
 damping and a rigid oil spring are limits of the law. A value outside is in another unit."""
 

@@ -128,9 +128,9 @@ def test_the_temperature_is_that_of_the_oil_at_the_ends_too(rng: Generator) -> N
     for _ in range(8):
         record, truth = warming(rng)
         (cleaned,) = clean((record,))
-        cleaned = cleaned.record.temperature
-        assert cleaned is not None
-        away = np.abs(cleaned - np.interp(cleaned.record.time, record.time, truth))
+        temperature = cleaned.record.temperature
+        assert temperature is not None
+        away = np.abs(temperature - np.interp(cleaned.record.time, record.time, truth))
         assert float(np.max(away)) < 0.4 * NOISE
 
 

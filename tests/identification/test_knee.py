@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 
 from pzd.artefacts import (
     Diagnosed,
@@ -251,6 +252,20 @@ def test_a_bleed_through_a_jet_is_square_and_leaves_the_friction_to_the_seal(rng
     assert row.rebound_knee_force_N == pytest.approx(635.0, rel=0.03)
     assert row.compression_knee_force_N == pytest.approx(355.0, rel=0.03)
     assert row.friction_N == pytest.approx(35.0, abs=5.0)
+
+
+def test_a_damper_of_a_building_has_the_same_law_in_larger_numbers(generator_for: Callable[[str], Generator]) -> None:
+    """Of 20 MN: numbers of the law beyond what those of a car have are no reason to end with a fault."""
+    strong = 2e4
+    of_car, of_building = (
+        found(lambda motion, times=times: times * needle_and_shims(motion), generator_for("alike")).knees.rows[0]
+        for times in (1.0, strong)
+    )
+    assert of_building.rebound_bleed_square_Ns2_per_m2 == pytest.approx(
+        strong * (of_car.rebound_bleed_square_Ns2_per_m2 or 0.0), rel=1e-3
+    )
+    assert of_building.rebound_knee_force_N == pytest.approx(strong * (of_car.rebound_knee_force_N or 0.0), rel=1e-3)
+    assert of_building.W_s == pytest.approx(of_car.W_s, rel=1e-3)
 
 
 def shims_and_a_seal(motion: Motion) -> Array:

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import LARGEST_DAMPING, LARGEST_FORCE, LARGEST_SQUARE, Effect, Parameter, Search
 
-NO_KNEE = 1.0e7
+NO_KNEE = LARGEST_FORCE
 """Knee force of a direction without a knee [N]: no damper reaches it."""
 
 STEEPEST = 1.0 - 1e-6
@@ -50,15 +50,28 @@ EFFECT = Effect(
     parameters=(
         Parameter("beta", "-", 0.0, -STEEPEST, STEEPEST, "share by which the bleed of rebound is steeper", _SHARE),
         Parameter("F_reb", "N", inf, 0.0, NO_KNEE, "force of the knee in rebound", _FORCES),
-        Parameter("C_reb", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in rebound", _SLOPES),
+        Parameter("C_reb", "N s/m", 0.0, 1.0e-3, LARGEST_DAMPING, "blow-off slope in rebound", _SLOPES),
         Parameter("F_comp", "N", inf, 0.0, NO_KNEE, "force of the knee in compression", _FORCES),
-        Parameter("C_comp", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in compression", _SLOPES),
-        Parameter("q_reb", "N s2/m2", 0.0, 0.0, 1.0e8, "square part of the bleed in rebound", _SQUARES, optional=True),
+        Parameter("C_comp", "N s/m", 0.0, 1.0e-3, LARGEST_DAMPING, "blow-off slope in compression", _SLOPES),
         Parameter(
-            "q_comp", "N s2/m2", 0.0, 0.0, 1.0e8, "square part of the bleed in compression", _SQUARES, optional=True
+            "q_reb", "N s2/m2", 0.0, 0.0, LARGEST_SQUARE, "square part of the bleed in rebound", _SQUARES, optional=True
         ),
-        Parameter("s_reb", "N", 0.0, 0.0, 1.0e6, "spread of the knee force in rebound", _SPREADS, optional=True),
-        Parameter("s_comp", "N", 0.0, 0.0, 1.0e6, "spread of the knee force in compression", _SPREADS, optional=True),
+        Parameter(
+            "q_comp",
+            "N s2/m2",
+            0.0,
+            0.0,
+            LARGEST_SQUARE,
+            "square part of the bleed in compression",
+            _SQUARES,
+            optional=True,
+        ),
+        Parameter(
+            "s_reb", "N", 0.0, 0.0, LARGEST_FORCE, "spread of the knee force in rebound", _SPREADS, optional=True
+        ),
+        Parameter(
+            "s_comp", "N", 0.0, 0.0, LARGEST_FORCE, "spread of the knee force in compression", _SPREADS, optional=True
+        ),
     ),
     source="bleed and blow-off stages of a shimmed piston; Dixon 2007, The Shock Absorber Handbook",
     tests=(
