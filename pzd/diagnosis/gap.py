@@ -205,13 +205,14 @@ def _check_samples(
 
 
 def _folded(cleaned: CleanedRecord, residual: Array, mask: Mask) -> Array | None:
-    """Return the wanted whole cycles of the residual, one row each; None with fewer than two."""
+    """Return the wanted whole cycles of the residual, one row each; None where they do not tell noise from misfit."""
     run = cleaned.cycles
     if run is None:
         return None
     time = cleaned.record.time
     whole = run.whole(time, mask)
-    return run.fold(time, residual)[whole] if len(whole) >= 2 else None
+    folded = run.fold(time, residual)[whole]
+    return folded if lack_of_fit.cycles_tell_noise(*folded.shape) else None
 
 
 OUT_OF_REACH = 0.01

@@ -13,7 +13,7 @@ from pzd.parallel.on_disk import one_at_a_time
 from pzd.quantities import BINGHAM
 from pzd.record import Array
 from pzd.signals.jumps import jump_timing_error
-from pzd.signals.lack_of_fit import fit_smooth_residual, p_values_by_harmonics, pooled_p_value
+from pzd.signals.lack_of_fit import cycles_tell_noise, fit_smooth_residual, p_values_by_harmonics, pooled_p_value
 from pzd.signals.measures import SIGNIFICANCE, VISIBLE
 from pzd.signals.noise import pure_error, repeatable_power
 from pzd.signals.nuisance import NUISANCE_LIMIT, reducing_share
@@ -366,7 +366,7 @@ def misfit_of(records: Sequence[FittedRecord]) -> Misfit:
         if not record.constant:
             continue
         folded = record.folded(cleared)
-        if folded is None:
+        if folded is None or not cycles_tell_noise(*folded.shape):
             still = replace(record.record, voltage=None)  # constant but for noise, which is no regressor
             fit = fit_smooth_residual(cleared, still, record.force - record.residuals, record.counted)
             smooth.append(np.array([fit.probability]))

@@ -25,8 +25,15 @@ TREND_CYCLES = 4
 """Fewest cycles for a trend: three steps between cycles."""
 TREND_HARMONICS = 15
 """Harmonics in which a trend is sought: those that a change of T0, C or k moves most."""
-FEWEST_DIFFERENCES = 100
-"""Fewest samples of differences between cycles for the colour of the noise; with fewer nothing is judged."""
+FEWEST_DIFFERENCES = 20
+"""Fewest samples of differences between cycles for the colour of the noise.
+
+Reason: down to there its degrees of freedom hold the rate of false alarms (tests/signals/test_noise.py)."""
+
+
+def cycles_tell_noise(cycles: int, points: int) -> bool:
+    """Whether so many cycles of so many samples tell noise from misfit; else the record is judged sample by sample."""
+    return (cycles - 1) * points >= FEWEST_DIFFERENCES
 
 
 def p_values_by_harmonics(error: PureError) -> Array:
@@ -43,7 +50,7 @@ def p_values_by_harmonics(error: PureError) -> Array:
 
     ratio = np.abs(error.mean) ** 2 / np.where(error.of_mean > 0.0, error.of_mean, np.inf)
     octaves = octave_bands(error.mean.size - 1)
-    if (error.count - 1) * error.points < FEWEST_DIFFERENCES:
+    if not cycles_tell_noise(error.count, error.points):
         return np.ones(len(octaves))
     found = []
     for low, high in octaves:
@@ -122,7 +129,9 @@ SINGULAR_SHARE = 1e-9
 VOLTAGE_LAGS = (0.005, 0.02, 0.08)
 """Time constants with which the force may lag a moving voltage [s]: from a valve to its supply."""
 SAMPLES_PER_TERM = 20
-"""Fewest samples a term of the model; with fewer nothing is judged."""
+"""Fewest samples a term of the model."""
+FEWEST_TERMS = 3
+"""Terms of the shortest record that is judged: a constant force, and one along displacement and speed."""
 QUIETEST = 0.05
 """Least density of the noise at any frequency, as a share of its mean.
 
@@ -175,7 +184,7 @@ def fit_smooth_residual(
     from scipy.special import fdtrc
 
     terms = _smooth_terms(record, predicted, counted)
-    if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
+    if terms.shape[1] < FEWEST_TERMS:
         nothing = np.zeros(residual.size)
         return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0, 1.0)
     basis = _orthonormal(terms)
@@ -195,10 +204,12 @@ def fit_smooth_residual(
         explained = to_samples @ taken
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
+    # The colour is known by as many samples as are independent of each other, and no better.
+    known_by = float(np.clip(noise.independent(flat.size) - rank, 1.0, free))
     over = float(flat @ flat - taken @ taken)
     # QUIETEST adds white noise that may not be there: then the remainder is smaller than expected.
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
-    by_noise, shown, freedom = rank * scale, float(rank), float(free)
+    by_noise, shown, freedom = rank * scale, float(rank), known_by
     if drawn and noise.innovation > 0.0:
         parts = [_taken_of_error(motion, force, predicted - force, counted, noise, whole) for motion, force in drawn]
         spread = spread + np.mean([part**2 for part, _, _ in parts], axis=0)
@@ -213,7 +224,7 @@ def fit_smooth_residual(
         directions = float(np.clip(2.0 * own**2 / fewest, 1.0, rank)) if fewest > 0.0 else float(rank)
         beyond = by_noise - white
         shown = by_noise**2 / (white**2 / rank + beyond**2 / directions)
-        freedom = by_noise**2 / (white**2 / free + beyond**2 / (directions * each.size))
+        freedom = by_noise**2 / (white**2 / known_by + beyond**2 / (directions * each.size))
     ratio = float(taken @ taken) / by_noise if over > 0.0 else np.inf
     excess = by_noise / (rank * scale) if scale > 0.0 else 1.0
     return SmoothResidual(explained, spread, noise, float(fdtrc(shown, freedom, ratio)), excess)
@@ -243,22 +254,30 @@ def _orthonormal(terms: Array) -> Array:
 
 
 def _smooth_terms(record: Record, predicted: Array, counted: Mask) -> Array:
-    """Return smooth functions (m, p) of motion, force, voltage and time, scaled to about one."""
+    """Return smooth functions (m, p) of motion, force, voltage and time, scaled to about one.
+
+    Of a short record the few that most laws move most, as many as its samples determine.
+    """
     part = sliced(record, counted)
-    v, a = _scaled(part.velocity), _scaled(part.acceleration)
+    x, v, a = (_scaled(channel) for channel in (part.displacement, part.velocity, part.acceleration))
     rate = _scaled(gradient_within_stretches(predicted, counted))
+    products = [a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), x * v]
     columns = [
         _hats(part.velocity),
         _hats(part.displacement),
         _hats(predicted),
-        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(part.displacement) * v]),
+        np.column_stack(products),
         _hats(part.time)[:, ::3],
     ]
     along = np.column_stack([np.sign(v), v])
     if record.voltage is not None and part.voltage is not None and np.ptp(part.voltage) > 0.0:
         columns.append(_hats(part.voltage)[:, ::2] * np.sign(v)[:, None])
         columns += [_lag_error(record.voltage, tau * record.rate)[counted][:, None] * along for tau in VOLTAGE_LAGS]
-    return np.column_stack(columns)
+    most = v.size // SAMPLES_PER_TERM
+    if sum(each.shape[1] for each in columns) <= most:
+        return np.column_stack(columns)
+    few = [np.ones(v.size), x, v, np.abs(v), _scaled(predicted), *products]
+    return np.column_stack(few[:most]) if most else np.zeros((v.size, 0))
 
 
 def _lag_error(voltage: Array, samples: float) -> Array:

@@ -151,6 +151,15 @@ class Autoregression:
         response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
         return np.asarray(self.innovation / np.abs(response) ** 2)
 
+    def independent(self, samples: int) -> float:
+        """Return how many of some samples count as independent of each other.
+
+        Equation: n var / S_max, S_max at least 5 var                                   Source: Bartlett 1946
+        """
+        if self.variance <= 0.0:
+            return float(samples)
+        return samples / max(float(np.max(self._density_on_grid)) / self.variance, LEAST_COLOUR)
+
     @property
     def whitening_filter(self) -> Array:
         """Coefficients (p + 1,) 1, -a_1, ... -a_p of the filter from e to w."""

@@ -101,3 +101,36 @@ def test_noise_of_the_displacement_is_no_misfit_of_a_viscous_force(rng: Generato
     missed = 0.01 * damping * record.velocity * np.abs(record.velocity) / np.max(record.velocity)
     seen_too = fit_smooth_residual(measured + missed - predicted, seen, predicted, everything, others)
     assert seen_too.probability < 1e-6  # the force is half a per cent of peak, that of the displacement's noise a tenth
+
+
+# --- Short records: few samples of a motion that no cycle repeats
+
+
+def short(samples: int) -> tuple[Record, Array]:
+    """Two periods of a slow sine and a force with friction for it, in so many samples."""
+    t = np.linspace(0.0, 1.9, samples)
+    x = 0.018 * np.sin(2.0 * np.pi * 1.05 * t)
+    v = np.gradient(x, t)
+    force = 20.0 * np.tanh(v / 0.01) + 1100.0 * v
+    return Record("short", None, t, x, v, np.gradient(v, t), force, None), force
+
+
+@pytest.mark.parametrize("samples", [64, 142, 300, 700])
+@pytest.mark.parametrize("follows", [0.0, 0.6])
+def test_false_alarms_of_short_records_are_rare(samples: int, follows: float, rng: Generator) -> None:
+    """With the samples for degrees of freedom, however coloured, 3 % of such noise were below one in a thousand."""
+    record, force = short(samples)
+    drawn = lfilter([1.0], [1.0, -follows], rng.standard_normal((200, samples + 300)), axis=1)[:, 300:] * SIZE
+    everything = np.ones(samples, dtype=np.bool_)
+    found = np.array([fit_smooth_residual(each, record, force, everything).probability for each in drawn])
+    assert np.mean(found < 1e-3) < 0.03
+
+
+@pytest.mark.parametrize("samples", [64, 142, 300])
+def test_a_constant_force_that_a_short_record_misses_is_found(samples: int, rng: Generator) -> None:
+    """A damper was called complete that missed 55 N of 130: too short for 33 terms, the record was not judged."""
+    record, force = short(samples)
+    missed = SIZE * rng.standard_normal(samples) - 10.0 * SIZE
+    found = fit_smooth_residual(missed, record, force, np.ones(samples, dtype=np.bool_))
+    assert found.probability < 1e-6
+    assert np.mean(found.explained) == pytest.approx(-10.0 * SIZE, rel=0.05)
