@@ -167,8 +167,9 @@ class UnitRow(ConditionRow):
     rebound_N_per_unit: float
     """By how much the magnitude of the force rises a unit, without the gas; below zero where it falls."""
     compression_N_per_unit: float
-    gas_force_N_per_unit: float
-    """By how much the gas force itself changes; below zero where the gas pushes the rod out more."""
+    gas_force_N_per_unit: float | None
+    """By how much the gas force itself changes; below zero where the gas pushes the rod out more. None where the tests
+    tell none from a rebound unlike compression: what it changes by is then in both of these."""
 
 
 class PredictedRow(RecordRow):
@@ -192,6 +193,12 @@ class LawRow(Frozen):
     reason: str
 
 
+UNSHOWN = 30.0
+"""Times the force of the tests (r.m.s.), or what makes it at their speed, from which a number of the law is not shown.
+
+Reason: no bleed, knee or blow-off of a damper is so far beyond what was run on it; not tuned."""
+
+
 @dataclass(frozen=True)
 class DirectionOfCondition:
     """Force at the trade's speeds, and the knee law, of one direction of one condition."""
@@ -206,6 +213,15 @@ class DirectionOfCondition:
     def estimate(self, column: str) -> Estimate:
         """Return one of `OF_A_DIRECTION` or `OF_BOTH` with its 95 % interval; no value where there is no knee."""
         return Estimate.of(self.row, column if column in OF_BOTH else f"{self.direction}_{column}")
+
+    def shows(self, column: str) -> bool:
+        """Whether the tests tell one of these at all: its interval ends below `UNSHOWN` times what they reached."""
+        high = self.estimate(column).high95
+        if high is None or self.row.W_s <= 0.0:
+            return True
+        force, speed = self.row.rmse_N / self.row.W_s**0.5, self.row.reached_m_per_s
+        by_unit = {"_Ns2_per_m2": force / speed**2, "_Ns_per_m": force / speed, "_m_per_s": speed, "_N": force}
+        return bool(high <= UNSHOWN * next(size for unit, size in by_unit.items() if column.endswith(unit)))
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,9 @@ def fit_with_auxiliary(
     values = values + auxiliary_remainder(objective, fit)
     objective = without_auxiliary_force(whole, values)
     fit = descend(objective, fit.parameters)
-    auxiliary = significant_auxiliary(records, objective, fit, values, config.nuisance)
+    alone = whole.fitted_by_record(element_alone.parameters)
+    missed = trust.misfit_of(fitted_records(records, whole.prepared, alone, config.nuisance))
+    auxiliary = significant_auxiliary(records, objective, fit, values, config.nuisance, missed)
     return (whole, element_alone, None) if auxiliary is None else (objective, fit, auxiliary)
 
 
@@ -383,9 +385,17 @@ def auxiliary_remainder(objective: Objective, fit: Fit) -> Array:
 
 
 def significant_auxiliary(
-    records: Sequence[Record], objective: Objective, fit: Fit, values: Array, nuisance: NuisanceConfig
+    records: Sequence[Record],
+    objective: Objective,
+    fit: Fit,
+    values: Array,
+    nuisance: NuisanceConfig,
+    missed: trust.Misfit,
 ) -> Auxiliary | None:
     """Return the forces with their intervals; None where the tests do not show them.
+
+    Of few cycles an interval is wide. Where the element alone misses something and with these forces nothing, either
+    needs to be there by the customary interval alone: T0 and C would pay for what is left out.
 
     Parameters
     ----------
@@ -394,15 +404,17 @@ def significant_auxiliary(
     fit : the optimum
     values : (2,) forces that were subtracted, so that no remainder is left
     nuisance : standard deviations of what differs from test to test
+    missed : by the element alone
     """
     columns, middle = auxiliary_columns(objective)
     slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1] * objective.weight[:, None], columns])
     by_record = split_by_record(objective.prepared, fit.residuals, slopes)
     fitted = fitted_records(records, objective.prepared, by_record, nuisance)
     misfit = trust.misfit_of(fitted)
-    if not np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]):
-        return None
-    return Auxiliary(values, half_widths(fitted, misfit)[3:], middle)
+    widths = half_widths(fitted, misfit)[3:]
+    closed = missed.share > 0.0 and misfit.share == 0.0
+    wide = widths if closed else half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]
+    return Auxiliary(values, widths, middle) if np.any(np.abs(values) > wide) else None
 
 
 def subtract_auxiliary(record: Record, auxiliaries: Sequence[AuxiliaryRow]) -> Record:

@@ -20,7 +20,7 @@ from pzd.artefacts.changes import Course, CourseRow
 from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerSummaryRow
 from pzd.artefacts.identified import AVERAGED, GasAndFrictionRow, courses
-from pzd.artefacts.knee import DIRECTIONS
+from pzd.artefacts.knee import DIRECTIONS, DirectionOfCondition, UnitRow
 from pzd.artefacts.rig import slowest_test_force
 from pzd.artefacts.table import at_largest_speed
 from pzd.damper.effect import Effect
@@ -90,6 +90,8 @@ def _base_value(row: ParameterRow | BaseRow, name: str) -> Estimate:
 
 NO_GAS = "cannot be told from asymmetry"
 """Of the gas force without a slow test."""
+READ = {"at the lowest speed": "at the only speed, whose viscous force is in it"}
+"""How the static force is read, where the name of the method in the file says less than a reader needs."""
 
 
 def characteristics(found: Characteristics, control: Control) -> Iterator[Table]:
@@ -124,7 +126,11 @@ def characteristics(found: Characteristics, control: Control) -> Iterator[Table]
                     "friction_N", "friction", "N", lambda row: static_force(row, row.friction_N, "no line leads to it")
                 ),
                 Column("velocity_m_per_s", "slowest speed", "m/s"),
-                Column("method", "how"),
+                Column(
+                    "method",
+                    "how",
+                    value=lambda row: READ.get(row.method, row.method),
+                ),
             ),
             found.gas_and_friction,
             FOLD,
@@ -222,7 +228,7 @@ def knee(found: Knees, control: Control) -> Iterator[Table]:
         "intervals, and the status of the condition",
         (
             *conditions(control, lambda each: each.row),
-            _estimated("gas_force_N", "offset", "N"),
+            Column("gas_force_N", "offset", "N", _offset),
             _estimated("friction_N", "seal friction", "N"),
             Column("status", "status", value=lambda each: each.row.status),
         ),
@@ -280,12 +286,29 @@ def _force_at(place: int, speed: float) -> Column:
     )
 
 
+UNKNOWN = "not shown"
+"""Of a number of the knee law whose interval reaches as far as the search."""
+
+
 def _estimated(column: str, head: str, unit: str, *, optional: bool = False) -> Column:
-    return Column(column, head, unit, lambda each: each.estimate(column), optional=optional)
+    def value(each: DirectionOfCondition) -> Estimate | str:
+        return each.estimate(column) if each.shows(column) else UNKNOWN
+
+    return Column(column, head, unit, value, optional=optional)
+
+
+def _offset(each: DirectionOfCondition) -> Estimate | str:
+    """Return the force beside the law; a word where the tests do not tell it from none and it was left out."""
+    found = each.estimate("gas_force_N")
+    return "none that shows" if found == (0.0, 0.0, 0.0) else found
 
 
 def _per_unit(column: str, head: str) -> Column:
-    return Column(column, head, value=lambda row: Quantity(getattr(row, column), f"N/{row.unit}"))
+    def value(row: UnitRow) -> Quantity | str:
+        found = getattr(row, column)
+        return NO_GAS if found is None else Quantity(found, f"N/{row.unit}")
+
+    return Column(column, head, value=value)
 
 
 # --- diagnose: held-out prediction, adopted effects, candidates, hypotheses, peers ---
