@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from pzd.quantities import BINGHAM, CHANNELS, TIME, VOLTAGE, Control
 from pzd.rig.stand.config import VirtualEntry
@@ -203,6 +203,8 @@ class FilesEntry(Frozen):
     """Whether the line below the header holds the units."""
     comment: str | None = Field(default=None, min_length=1, max_length=1)
     """Lines that begin with this character are left out."""
+    leave_out: Searched | None = None
+    """Regular expression; data lines in which it is found are left out, as messages that a logger wrote among them."""
     encoding: str = "utf-8"
     """Encoding of the text."""
     beside: Beside | None = None
@@ -210,15 +212,15 @@ class FilesEntry(Frozen):
     source: str | None = None
     """Where the files can be had: shown when they are absent."""
 
-    @field_validator("pattern", "preamble")
+    @field_validator("pattern", "preamble", "leave_out")
     @classmethod
-    def _compiles(cls, pattern: str | None) -> str | None:
+    def _compiles(cls, pattern: str | None, info: ValidationInfo) -> str | None:
         if pattern is not None:
             try:
                 groups = re.compile(pattern).groupindex
             except re.error as error:
                 raise ValueError(f"not a regular expression: {error}") from None
-            if not groups:
+            if not groups and info.field_name != "leave_out":
                 raise ValueError("needs a named group, e.g. (?P<voltage>[0-9.]+)V")
         return pattern
 

@@ -7,6 +7,7 @@ the reader; every one is the same test, 15 mm at 2 Hz on a damper of 1200 N s/m 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -547,3 +548,53 @@ def test_a_row_with_a_field_too_many_is_no_numbered_row(tmp_path: Path, header: 
     (tmp_path / "a.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"a\.csv:2: 4 fields where the header has 3"):
         ingest(RigConfig(files=(FilesEntry(path="a.csv"),)), Control(), tmp_path)
+
+
+# --- A board of students: a column without its sensor, and words among the rows
+
+BOARD = ["Millis,Load_Cell,Linear_Pot (scaled),Thermocouple", *(
+    f"{1000.0 * t:.0f},{f:.4f},{x:.5f}" for t, x, f in zip(TIME, MM, FORCE, strict=True)
+)]  # fmt: skip
+
+
+def board(folder: Path, rows: Sequence[str], **more: object) -> Any:
+    (folder / "b.csv").write_text("\n".join([*BOARD[:1], *rows]) + "\n", encoding="utf-8")
+    entry = proposed(folder / "b.csv")
+    units = {**entry["units"], "displacement": "mm", "force": "N"}
+    said = RigConfig.model_validate_json(json.dumps({"files": [{**entry, "units": units, **more}]}))
+    return ingest(said, Control(), folder)
+
+
+def test_the_last_column_of_a_header_may_have_no_field_in_any_row(tmp_path: Path) -> None:
+    """A logger without a thermocouple: `4 fields where the header has 5` in every line, and no key that helped."""
+    (record,) = board(tmp_path, BOARD[1:]).records
+    np.testing.assert_allclose(record.force, FORCE, atol=1e-3)
+    np.testing.assert_allclose(record.displacement, X, atol=1e-6)
+
+
+def test_a_column_that_is_asked_for_and_has_no_field_is_refused(tmp_path: Path) -> None:
+    columns = {"time": "Millis", "displacement": "Linear_Pot (scaled)", "force": "Load_Cell"}
+    with pytest.raises(DataError, match=r"b\.csv:1: Thermocouple: no row of the file has a field under this header"):
+        board(tmp_path, BOARD[1:], columns={**columns, "temperature": "Thermocouple"})
+
+
+def test_a_name_with_the_separator_in_it_shifts_no_column(tmp_path: Path) -> None:
+    """`Force, N` without quotes is two names: the displacement would be read under that of the next column."""
+    rows = ["t,Force, N,pos,temp", *(f"{t:.3f},{f:.4f},{x:.5f},20" for t, x, f in zip(TIME, MM, FORCE, strict=True))]
+    (tmp_path / "n.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    entry = {"path": "n.csv", "columns": {"time": "t", "displacement": "pos", "force": "Force"}}
+    said = {"files": [{**entry, "units": {"time": "s", "displacement": "mm", "force": "N"}}]}
+    with pytest.raises(DataError, match="4 fields where the header has 5"):
+        ingest(RigConfig.model_validate_json(json.dumps(said)), Control(), tmp_path)
+
+
+@pytest.mark.parametrize("row", ["801,Switched from 8 to 9,", "801,Switched from 8 to 9,,,"])
+def test_the_key_that_is_advised_leaves_a_message_among_the_rows_out(tmp_path: Path, row: str) -> None:
+    rows = [*BOARD[1:402], row, *BOARD[402:]]
+    with pytest.raises(DataError) as refused:
+        board(tmp_path, rows)
+    advised = re.search(r"say leave_out: '([^']+)'", str(refused.value))
+    assert advised is not None
+    rig = board(tmp_path, rows, leave_out=advised[1])
+    np.testing.assert_allclose(rig.records[0].force, FORCE, atol=1e-3)
+    assert any("'Switched from 8 to 9' is found" in str(row) for row in rig.ingested)

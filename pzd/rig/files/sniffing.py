@@ -45,7 +45,7 @@ from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in,
 from pzd.rig.files.layout import ALSO_READ, minus_before, own_quantity
 from pzd.rig.files.one_clock import headers_together
 from pzd.rig.files.sheet import Wanted, spelled
-from pzd.rig.files.units import SPELLINGS, UnitError, factor_in, in_header, to_canonical
+from pzd.rig.files.units import SPELLINGS, UnitError, factor_in, in_header, is_unit, to_canonical
 from pzd.schema.errors import DataError, at
 
 # --- Quantity of a column, by its header in ten languages: de en es fr it ja pl pt ru zh ---
@@ -55,10 +55,10 @@ _LOOKS_LIKE = {
     r"|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
     r"|\u65f6\u95f4|\u6642\u9593|^\u0432\u0440\u0435\u043c",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera"
-    r"|spostament|corsa|desloca|^curso|przemieszcz|^skok"
+    r"|(?<![a-z])pot(?![a-z])|potentiom|recorrido|spostament|corsa|desloca|^curso|przemieszcz|^skok"
     r"|\u043f\u0435\u0440\u0435\u043c\u0435\u0449|\u0441\u043c\u0435\u0449|^\u0445\u043e\u0434"
     r"|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
-    VELOCITY: r"^v$|vel|speed|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6"
+    VELOCITY: r"^v$|vel(?!.*rpm)|speed(?!.*rpm)|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6"
     r"|\u0441\u043a\u043e\u0440\u043e\u0441\u0442",
     ACCELERATION: r"^a$|acc|beschl|acel|przyspiesz|\u52a0\u901f\u5ea6",
     FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga|forza|carico|^si[lł]a|(?<![\u538b\u5727])\u529b"
@@ -101,6 +101,8 @@ _CONTROLS_WITH_UNIT = {
     Control("current", "A"): "^i$|ctrl|control|valve|coil",
 }
 """Symbols of the control signal where a unit of it follows: `U_V`, `ctrl [V]`, `Coil/A`."""
+_CLOCKS = {"millis": "ms", "micros": "us"}
+"""Units of the clocks of small boards, after whose functions columns are named."""
 _LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%\u0400-\u04ff][A-Za-zµ°/²^0-9\u0400-\u04ff]*)$")
 _DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | dict.fromkeys(("F", "°F", "deg F"), "degF")
 """Spellings of degrees that pint does not know, or takes for coulombs and farads."""
@@ -191,6 +193,8 @@ def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
         return None  # only a person knows which way it counts
     last = _LAST_WORD.search(header)
     text = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
+    if not text and quantity is TIME:
+        text = next((unit for begin, unit in _CLOCKS.items() if header.lower().startswith(begin)), None)
     if not text:
         return None
     unit = _DEGREES.get(text, text) if quantity is TEMPERATURE else text
@@ -706,6 +710,7 @@ def _table(
         )
     )
     top = first - 1 - units
+    rows[top] = _with_fields(rows[top], width if separator != BLANKS and not units else len(rows[top]))
     if len(rows[top]) != width:
         return None
     if separator == BLANKS and any(head.endswith((",", ";")) for head in rows[top]):
@@ -719,6 +724,11 @@ def _table(
         names = _names_further_up(rows, first, width)
         found = replace(found, header=names, units=None, skip=start, units_row=False, apart=True) if names else found
     return (len(alike), sum(numbers[n] for n in alike)), found
+
+
+def _with_fields(names: list[str], width: int) -> list[str]:
+    """Return names without the last ones, which have no field in any row; not where one may hold the separator."""
+    return names if any(map(is_unit, names[1:])) else names[: max(width, 1)]
 
 
 _FEWEST_NAMED = 2  # channels of a rig in a line of names; one may be named by chance

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.quantities import Quantity
+from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
 from pzd.record import Array
 
 if TYPE_CHECKING:
@@ -181,6 +181,25 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
         advice = meant_by(unit, quantity) or f"write one like {quantity.unit!r}"
         raise UnitError(f"{quantity.name}: {unit!r} is no unit of it ({_one_line(error)}); {advice}") from None
     return np.asarray(converted.magnitude, dtype=np.float64)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of something that a rig records, and nothing else.
+
+    Examples
+    --------
+    >>> [text for text in ("N", "mm", "[kN]", "Force", "x") if is_unit(text)]
+    ['N', 'mm', '[kN]']
+    """
+
+    def of(quantity: Quantity) -> bool:
+        try:
+            to_canonical(np.zeros(1), text.strip("[]() "), quantity)
+        except UnitError:
+            return False
+        return True
+
+    return any(map(of, (TIME, DISPLACEMENT, FORCE, VELOCITY, VOLTAGE, TEMPERATURE)))
 
 
 def meant_by(unit: str, quantity: Quantity) -> str | None:

@@ -43,6 +43,7 @@ from pzd.rig.files.sheet import (
     told_below,
     words_below,
 )
+from pzd.rig.files.units import is_unit
 from pzd.schema.errors import DataError, at, counted
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 KIND = "a text file"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 NEEDS = None
-OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
+OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "leave_out", "encoding")
 
 _EVENT_SEPARATOR = "\x1e"
 """Replaces a separator inside an event, which no logger quotes."""
@@ -65,6 +66,8 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]
 """A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
 _EMPTY_LINE = re.compile(r"\n[ \t]*\n")
 """Between rows; where no clock tells whether the recording goes on behind it, such a line is refused."""
+_WORD = re.compile("[A-Za-z]{2}")
+"""What a message of a logger holds, and a number does not."""
 _UNIT_CELL = re.compile(r"[\[(]?\s*[A-Za-z\u00b5\u00b0%][A-Za-z0-9\u00b5\u00b0%/*^ ]{0,12}[\])]?")
 """A cell that may be a unit."""
 
@@ -112,6 +115,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
     lines, below = _without_words_below(lines)
     body, numbers = lines.body, lines.numbers
+    header, without_fields = _without_empty_columns(path, lines, entry, header, wanted, header_line)
     uneven = lines.fields != len(header)
     trailing = 0
     if entry.split is not None and entry.split.event == header[-1]:
@@ -135,7 +139,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     sparse = {i: cells for i in faults if header[i] in wanted.held and (cells := table.sparse(i)) is not None}
     values, faults = values | sparse, {i: told for i, told in faults.items() if i not in sparse}
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    steps = (*_steps(entry, header, wanted, numbers, trailing), *below)
+    steps = (*_steps(entry, header, wanted, numbers, trailing), *without_fields, *below)
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
 
 
@@ -145,7 +149,7 @@ def _lines_of(path: Path, entry: FilesEntry, wanted: Wanted) -> _Lines:
     below = text[after_lines(text, entry.skip) :]
     rows = after_lines(below, (entry.header is None) + entry.units_row)
     below = below[:rows] + plain_numbers(below[rows:], entry.decimal)
-    quoted = entry.comment is not None or '"' in text
+    quoted = entry.comment is not None or entry.leave_out is not None or '"' in text
     return _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
 
 
@@ -180,6 +184,7 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     above = (entry.header is None) + entry.units_row
     heads: list[list[str]] = []
     numbers, fields = array("q"), array("q")  # a list of as many numbers takes five times the memory
+    is_left_out = re.compile(entry.leave_out).search if entry.leave_out is not None else None
     blocks: list[str] = []
     block: list[str] = []
     first_rows: list[str] = []
@@ -189,6 +194,8 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
             heads.append([cell.strip() for cell in row])
             continue
         if not line.strip() and (not numbers or entry.rate_Hz is None):
+            continue
+        if is_left_out is not None and is_left_out(line):
             continue
         if len(numbers) < _ROWS_READ:
             first_rows.append(line)
@@ -271,6 +278,30 @@ def _without_words_below(lines: _Lines) -> tuple[_Lines, list[ReadingStep]]:
     return replace(lines, body=kept, numbers=lines.numbers[:last], fields=lines.fields[:last]), [told_below(count)]
 
 
+def _without_empty_columns(
+    path: Path, lines: _Lines, entry: FilesEntry, header: list[str], wanted: Wanted, header_line: int | None
+) -> tuple[list[str], list[ReadingStep]]:
+    """Leave out the last columns of a header that have no field in any row, as a logger writes them without a sensor.
+
+    Not where a name may hold the separator, as `Force, N` does without quotes: the columns would be read as others.
+
+    Raises
+    ------
+    DataError : when one of them is wanted
+    """
+    count = int(np.argmax(np.bincount(lines.fields)))  # that of nearly all rows; the others are told
+    missing = header[count:]
+    split_names = any(map(is_unit, header[1:]))
+    if entry.header is not None or entry.units_row or not missing or count < 2 or split_names:
+        return header, []
+    if np.count_nonzero(lines.fields != count) > MOST_FAULTS:
+        return header, []
+    if lacking := [name for name in missing if name in wanted.known]:
+        place = at(path, header_line)
+        raise DataError([f"{place}: {name}: no row of the file has a field under this header" for name in lacking])
+    return header[:count], [ReadingStep("left out", None, f"columns {', '.join(missing)}, which no row has", "")]
+
+
 def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_], int]:
     """Take away a separator behind the last field of a row, which some loggers write on all rows or on some.
 
@@ -326,8 +357,7 @@ def _refuse_repeated_header(
 def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: int) -> list[str]:
     """Describe rows with more or fewer fields than the header."""
     separator = "" if lines.separator == _UNQUOTED else f" (separator {lines.separator!r})"
-    message = _messages_begin(lines, rows)
-    said = f"; if this is a message of the logger, say comment: {message}" if message else ""
+    said = _how_to_leave_out(lines, rows)
     shown = [
         f"{at(path, int(lines.numbers[r]))}: {lines.fields[r]} fields where the header has {width}{separator}{said}"
         for r in rows[:MOST_FAULTS]
@@ -337,6 +367,28 @@ def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: in
     most = rows.size > lines.fields.size // 2
     advice = "; if the header stands further down, say skip: lines above it" if most else ""
     return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{advice}"]
+
+
+def _how_to_leave_out(lines: _Lines, rows: NDArray[np.int64]) -> str:
+    """Say which key leaves uneven rows out, where they are few among others and hold a word, as messages do."""
+    if message := _messages_begin(lines, rows):
+        return f"; if this is a message of the logger, say comment: {message}"
+    if rows.size > min(MOST_FAULTS, lines.fields.size // 2):
+        return ""
+    every = lines.body.split("\n")
+    cells = [[cell.strip() for cell in every[row].split(lines.separator)] for row in rows.tolist()]
+    words = {next((cell for cell in of_row if _WORD.search(cell)), "") for of_row in cells}
+    return "" if "" in words else f"; if {LEFT_OUT} {found_in(words)}"
+
+
+LEFT_OUT = "this is no sample, say leave_out:"
+"""What to do about a line with a word among the samples, followed by the words."""
+
+
+def found_in(words: Collection[str]) -> str:
+    """Return the regular expression that finds any of some words, as YAML has it."""
+    pattern = "|".join(re.sub(r"\\ ", " ", re.escape(word)) for word in sorted(words))
+    return "'" + pattern.replace("'", "''") + "'"
 
 
 def _messages_begin(lines: _Lines, rows: NDArray[np.int64]) -> str | None:
@@ -363,6 +415,7 @@ def _steps(
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
     if dropped:
         kind = "that are empty" if entry.comment is None else f"that begin with {entry.comment!r}"
+        kind = kind if entry.leave_out is None else f"in which {entry.leave_out!r} is found"
         yield ReadingStep("left out", None, f"{counted(dropped, 'line')} {kind}", "")
     yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
@@ -468,6 +521,8 @@ class _Table:
                     words = words and (cell[0].isalpha() or cell.lower() in _NO_VALUE or cell[0] == "#")
             if bad:
                 advice = _advice(grouped=grouped, commas=commas, words=words)
+                if words and bad <= min(MOST_FAULTS, self.lines.size // 2) and all(_WORD.search(c) for _, c in first):
+                    advice += f"; if {LEFT_OUT} {found_in({cell for _, cell in first})}"
                 if bad == 1 and first[0][0] == 0 and _UNIT_CELL.fullmatch(first[0][1]):
                     advice = "; if this row holds the units, say units_row: true"
                 wrong = [(row, f"a number is needed (got {cell!r}){advice}") for row, cell in first]
