@@ -51,6 +51,11 @@ class PreflightRecord:
         """Whether the control signal stands still: one element and one gain then hold for the whole record."""
         return is_constant(self.record, voltage_scale([self.record]))
 
+    @property
+    def cycle_count(self) -> float:
+        """Number of cycles; of a motion that does not repeat one goes to either side and back."""
+        return float(self.cycles.count) if self.cycles else 0.5 * len(reversals(self.record.displacement))
+
     def channels(self) -> tuple[Channel, ...]:
         """Return every recorded channel but the clock: force and motion first, then what labels the record."""
         record, signal = self.record, self.control.quantity
@@ -134,8 +139,7 @@ def examined(tests: Iterable[Callable[[], PreflightRecord]], jobs: int, prefligh
             voltage_V=record.median_voltage(),
             temperature_degC=record.median_temperature(),
             rate_Hz=record.rate,
-            # A cycle of a motion that does not repeat goes to either side.
-            cycles=float(run.count) if run else 0.5 * len(reversals(record.displacement)),
+            cycles=test.cycle_count,
             control_moves=not test.constant_control,
             displacement_rms_m=float(np.std(record.displacement)),
             velocity_rms_m_per_s=float(np.std(record.velocity)),

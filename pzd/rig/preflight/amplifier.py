@@ -77,6 +77,11 @@ ORDERS = (1, 2)
 """Of the low-pass: an RC circuit; Butterworth's of second order, which stands for steeper ones too."""
 CORNERS = 8
 """Corners that are tried at first, from the motion's frequency to a tenth of the rate."""
+SLOWEST_CORNER = 2.0
+"""Least corner of a finding, as a multiple of the motion's frequency.
+
+Reason: nobody records a motion through a filter that takes it away, and a stroke without force looks alike (a shock
+with air in its oil at 1.18 Hz "behind 1.43 Hz"); not tuned."""
 CLOSER = 7
 """Corners and delays that are tried about the best one."""
 DELAYS = (-1.0, -0.5, 0.0, 0.5)
@@ -108,6 +113,8 @@ def _low_pass(section: Section, plain: ReferenceFit, slowest: float) -> tuple[Re
         return best, None
     nearer = corner * (corners[1] / corners[0]) ** np.linspace(-1.0, 1.0, CLOSER)
     best, corner = min(((_behind(section, order, one, 2), one) for one in nearer), key=lambda one: one[0].residual)
+    if corner < SLOWEST_CORNER * slowest:
+        return best, None
     return best, Finding(
         check="filter",
         where=f"force, the whole record, as behind a low-pass of {'first' if order == 1 else 'second'} order",
