@@ -82,6 +82,17 @@ def value_at(values: Numbers, index: int) -> float | None:
     return values[index] if isinstance(values, tuple) else values
 
 
+def growth(before: float, after: float) -> float | None:
+    """Return by what share the magnitude of a quantity grew; None where its sign turned, or it was 0.
+
+    Examples
+    --------
+    >>> growth(-200.0, -150.0), growth(0.0, 1.0)
+    (-0.25, None)
+    """
+    return abs(after) / abs(before) - 1.0 if before and before * after >= 0.0 else None
+
+
 def holds_what_was(row: Change | Unchanged, index: int) -> bool | None:
     """Tell whether the interval of a quantity holds its first value, at one of its control signals; None without."""
     start, _, low, high = values_at(row, index)

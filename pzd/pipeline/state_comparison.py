@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.artefacts import Identified, Rig
+from pzd.artefacts import Diagnosed, Identified, Rig
 from pzd.config import setting_in_use
 from pzd.diagnosis.changes.comparison import Compared, changes_between
 from pzd.diagnosis.changes.over import Followed, blocks_of_cycles, followed_over
-from pzd.diagnosis.changes.state import State, diagnosed_state
+from pzd.diagnosis.changes.state import State, diagnosed_state, with_adopted
 from pzd.identification.stage import identify
 from pzd.pipeline.command import Opened, execute
 from pzd.pipeline.dependencies import setting_of as setting_of_run
@@ -82,7 +82,9 @@ def _settings_told(given: Opened) -> list[str | None] | None:
 
 
 def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared:
-    """Bring rig and identify of both states up to date, diagnose the first in memory, and compare them.
+    """Bring rig and identify of both states up to date, and diagnose of the first, and compare them.
+
+    Of a setting that is not the one in use the diagnosis is made in memory.
 
     Raises
     ------
@@ -106,8 +108,9 @@ def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared
         for given, setting in zip((one, other), settings, strict=True)
     ]
     with other.placed():
-        first = _state(one, names[0], settings[0], jobs, diagnosed=True)
-        second = _state(other, names[1], settings[1], jobs, diagnosed=False)
+        first = _first_state(one, names[0], settings[0], jobs, say)
+        second = _state(other, names[1], settings[1], jobs)
+        say(f"changes    runs: {names[0]} and {names[1]} are compared")
         config = other.config
         return changes_between(first, second, config.diagnose, config.identify, other.run.control)
 
@@ -139,10 +142,10 @@ def follow_states(given: Opened, over: str, jobs: int, say: Say) -> Followed:
             states = _blocks(given, jobs)
         else:
             settings = [Named(given, name).chosen("--over") for name in names]
-            states = [
-                _state(given, name, setting, jobs, diagnosed=i == 0)
-                for i, (name, setting) in enumerate(zip(names, settings, strict=True))
-            ]
+            first = _first_state(given, names[0], settings[0], jobs, say)
+            pairs = zip(names[1:], settings[1:], strict=True)
+            states = [first, *(_state(given, name, setting, jobs) for name, setting in pairs)]
+        say(f"changes    runs: {len(states) - 1} states are compared with {states[0].name}")
         return followed_over(states, config.diagnose, config.identify, config.changes, control)
 
 
@@ -160,13 +163,22 @@ def _blocks(given: Opened, jobs: int) -> list[State]:
     return [first, *(State.of(name, rig, identified, setting, control) for name, rig in blocks[1:])]
 
 
-def _state(given: Opened, name: str, setting: str | None, jobs: int, *, diagnosed: bool) -> State:
-    rig, identified, config = given.run.read(Rig, jobs), given.run.read(Identified), given.config
-    state = State.of(name, rig, identified, setting, given.run.control)
-    if not diagnosed:
-        return state
+def _state(given: Opened, name: str, setting: str | None, jobs: int) -> State:
+    """Return a state with the damper that identify found."""
+    rig, identified = given.run.read(Rig, jobs), given.run.read(Identified)
+    return State.of(name, rig, identified, setting, given.run.control)
+
+
+def _first_state(given: Opened, name: str, setting: str | None, jobs: int, say: Say) -> State:
+    """Return a state with the damper that diagnose adopts, by its stage where that is about this setting."""
+    state, config, control = _state(given, name, setting, jobs), given.config, given.run.control
+    if setting == setting_of_run(config, given.run):
+        execute(given, "diagnose", force=False, jobs=jobs, say=say)
+        return with_adopted(state, given.run.read(Diagnosed))
+    say(f"diagnose   runs in memory: it is about setting {setting}")
+    rig, identified = given.run.read(Rig, jobs), given.run.read(Identified)
     return diagnosed_state(
-        state, rig, identified, setting, config.diagnose, config.identify, config.measured_rig, given.run.control, jobs
+        state, rig, identified, setting, config.diagnose, config.identify, config.measured_rig, control, jobs
     )
 
 

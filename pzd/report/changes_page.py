@@ -12,6 +12,7 @@ from pzd.artefacts.changes import (
     Course,
     CourseRow,
     Unchanged,
+    growth,
     holds_what_was,
     value_at,
     values_at,
@@ -189,8 +190,8 @@ def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...
 
 def _growth_between(start: float | None, to: float | None, low: float | None, high: float | None) -> str:
     """Return by how many % the size of a quantity grew, with the interval; a dash where it was 0 or its sign turned."""
-    grown = None if start is None or to is None else _growth(start, to)
-    ends = [None if start is None or end is None else _growth(start, end) for end in (low, high)]
+    grown = None if start is None or to is None else growth(start, to)
+    ends = [None if start is None or end is None else growth(start, end) for end in (low, high)]
     if grown is None or None in ends:
         return percent(grown)
     least, most = sorted(end for end in ends if end is not None)
@@ -213,7 +214,7 @@ def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
         for at, way in ((int(np.argmax(cycle.velocity)), 1.0), (int(np.argmin(cycle.velocity)), -1.0)):
             before, after = float(cycle.force_before[at]), float(cycle.force_after[at])
             grown = amount(way * (after - before), "N")
-            cells += [amount(before, "N"), amount(after, "N"), grown, percent(_growth(before, after))]
+            cells += [amount(before, "N"), amount(after, "N"), grown, percent(growth(before, after))]
         at_control = DASH if cycle.voltage is None else amount(cycle.voltage, control.unit)
         test = cycle.after if cycle.before is not None else f"{cycle.after} (before: the model)"
         rows.append((test, at_control, amount(float(np.max(cycle.velocity)), "m/s"), *cells))
@@ -221,11 +222,6 @@ def _trade(cycles: Sequence[ComparedCycle], control: Control) -> TextTable:
         "Force at the peak velocity of each test, with the gas, and by how much it grew; a dash where the sign turned"
     )
     return TextTable(title, *_without_control_where_none(header, rows))
-
-
-def _growth(before: float, after: float) -> float | None:
-    """Return by what share the magnitude of a quantity grew; None where its sign turned, or it was 0."""
-    return abs(after) / abs(before) - 1.0 if before and before * after >= 0.0 else None
 
 
 # --- Pictures

@@ -427,7 +427,8 @@ def course(found: Course, control: Control) -> Table:
 
     def estimate(cell: tuple[CourseRow, str, int, int]) -> Estimate:
         row, _, i, at = cell
-        return Estimate(*(picked(each[i], at) for each in (row.values, row.low95, row.high95)))
+        value, low, high = (picked(each[i], at) for each in (row.values, row.low95, row.high95))
+        return Estimate(value) if low == high else Estimate(value, low, high)  # the first state is held
 
     verdicts = {True: "yes", False: "no", None: None}
     return Table(

@@ -13,6 +13,7 @@ from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS, Candidate
 from pzd.diagnosis.changes.findings import Findings, findings_between
 from pzd.diagnosis.changes.pairs import averaged
 from pzd.diagnosis.changes.quantities import refitted
+from pzd.diagnosis.changes.reason import beside_effects
 from pzd.diagnosis.changes.selection import GAIN
 from pzd.diagnosis.changes.state import State
 from pzd.diagnosis.changes.verdict import changes_of
@@ -86,6 +87,7 @@ def followed_over(
         reason="; ".join(
             [f"{r.to}: {r.verdict}" for r in results]
             + [line for row in judged for line in _leaves(row, states)]
+            + beside_effects(found[0], [row.name for row in judged])
             + [NOT_FOLLOWED.format(name, first.name) for name in open_]
         ),
         pass_=_together([*passes, *(None for _ in open_)]),

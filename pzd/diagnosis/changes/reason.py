@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts.changes import Change, Difference, Verdict
 from pzd.damper.compose import steady_force
-from pzd.damper.fitted_laws import knee
+from pzd.damper.fitted_laws import fitted_laws, knee
 from pzd.diagnosis.changes.candidates import ELEMENT_COLUMNS
 from pzd.diagnosis.changes.compared_tests import BEYOND_TESTED
 from pzd.diagnosis.changes.findings import Findings, error_share, not_averaged
@@ -55,6 +55,7 @@ def reason_of(
         told += [words for name in of_damper if (words := _kind_of_friction(found, name))]
         told += _gas_before(found, of_damper)
         told += _by_law_told(found, of_damper)
+        told += beside_effects(found, of_damper)
     elif verdict == "unchanged":
         told.append("nothing of the damper changed visibly")
         if (hidden := found.search.hidden(found.best)) > found.diagnose.visible:
@@ -94,6 +95,16 @@ def _kind_of_friction(found: Findings, name: str) -> str | None:
     if name == "stribeck_friction" and speed > fastest:
         return "stribeck_friction that falls off at no tested speed is dry friction beside the oil spring"
     return None
+
+
+def beside_effects(found: Findings, of_damper: Sequence[str]) -> list[str]:
+    """Say beside which effects of the first state T0 and C stand, where they changed: without these they are others."""
+    names = [name for name in found.first.damper.effects if name not in (*GAS_FORCES, *fitted_laws())]
+    changed = [name for name in of_damper if name in ELEMENT_COLUMNS]
+    if not names or not changed:
+        return []
+    are = "are those" if len(changed) > 1 else "is that"
+    return [f"{' and '.join(changed)} {are} beside {', '.join(names)} of {found.before.name}, not those of identify"]
 
 
 def _gas_before(found: Findings, of_damper: Sequence[str]) -> list[str]:

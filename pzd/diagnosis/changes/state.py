@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.artefacts import Identified, Rig
+from pzd.artefacts import Diagnosed, Identified, Rig
 from pzd.artefacts.identified import identified_damper
 from pzd.damper.effect import Scales
 from pzd.damper.fitted_laws import fitted_laws
@@ -75,9 +75,6 @@ def diagnosed_state(
 ) -> State:
     """Return the state with the effects that a diagnosis in memory adopts, which the first state needs.
 
-    Beside a fitted law those with a name alone: what only predicts follows an error of the law, which is the same in
-    both states, and would take a part of what changed in the place of a number of the law.
-
     Parameters
     ----------
     state : as it was identified
@@ -94,6 +91,14 @@ def diagnosed_state(
     """
     from pzd.diagnosis.stage import diagnose as run_stage
 
-    found = run_stage(diagnose, identify, stand, rig, identified, control, setting, jobs)
+    return with_adopted(state, run_stage(diagnose, identify, stand, rig, identified, control, setting, jobs))
+
+
+def with_adopted(state: State, found: Diagnosed) -> State:
+    """Return a state with the damper of its diagnosis.
+
+    Beside a fitted law those effects with a name alone: what only predicts follows an error of the law, which is the
+    same in both states, and would take a part of what changed in the place of a number of the law.
+    """
     by_law = any(name in fitted_laws() for name in found.baseline.effects)
     return replace(state, damper=found.baseline if by_law and found.diagnosis.verdict != "named" else found.damper)
