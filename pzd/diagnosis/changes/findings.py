@@ -130,13 +130,16 @@ class Findings:
             return True
         return beyond_noise(self.difference(best)) >= self.diagnose.visible * self.first.force
 
-    def may_be_seen(self, difference: Difference) -> bool:
-        """Whether what is left may be seen: where the model stands for every test, a visible share of the peak.
+    def may_be_seen(self, best: Fitted) -> bool:
+        """Whether what a fit leaves may be seen: where the model stands for every test, beyond what that may miss.
 
-        Of a difference that is hardly visible itself the error of the model makes up any share.
+        Of a difference that is hardly visible itself the error of the model makes up any share, and it is not the same
+        in every test: of a few, half as much again is chance.
         """
-        beyond = beyond_noise(difference) >= self.diagnose.visible * self.first.force
-        return beyond or any(c.before is not None for c in self.comparisons)
+        if any(c.before is not None for c in self.comparisons):
+            return True
+        beyond = [left - missed - (self.diagnose.visible * c.peak) ** 2 for c, left, missed in self.left_of_tests(best)]
+        return sum(beyond) > 0.0
 
     def left_of_tests(self, best: Fitted) -> Iterator[tuple[Comparison, float, float]]:
         """Yield every comparison with what is left of it beyond noise and its own offset, gain and delay [N^2].

@@ -59,7 +59,7 @@ def changes_of(found: Findings) -> Changes:
     if rivals:
         verdict = "ambiguous"
     told = list(dict.fromkeys(name for names in others.values() for name in names))
-    much = found.left_share(difference) > found.diagnose.unexplained_share and found.may_be_seen(difference)
+    much = found.left_share(difference) > found.diagnose.unexplained_share and found.may_be_seen(best)
     if much and not any(map(found.search.leaves_nothing, (best, *rivals.get(NOTHING, ())))):
         verdict = "unexplained"
         doubtful = {c.name for c in best.candidates if c.name in rivals or not _stands_out(found, best, c)}
