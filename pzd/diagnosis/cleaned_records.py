@@ -36,6 +36,17 @@ END_PARTS = 16
 """Parts of a record, of which the first and last give the temperature at its ends.
 
 Reason: of a test of seconds half a second, in which no oil warms unevenly, and hundreds of samples of noise."""
+MOVING_TEMPERATURE = 0.5
+"""Change of temperature over a test [K] up to which it counts as its average cycle, at one temperature.
+
+Reason: about the resolution of a thermocouple; not tuned."""
+SAMPLES_A_CYCLE = 200
+"""Samples in a cycle of a test in which the damper warms: each counts by itself, and more tell no more of its law.
+
+Reason: eight times those that a half cycle needs (`FEWEST_IN_HALF_CYCLE`); a slow test at 1 kHz has 2000, and took ten
+times as long."""
+LEAST_RATE = 250.0
+"""Least rate of such a test [Hz]: below it hum of the mains would pass for something slower."""
 REPEATING_SHARE = 0.5
 """Share of the travel that the repeating run must hold, else the record counts as not repeating; rest before and after
 does not count."""
@@ -115,6 +126,8 @@ def clean(records: Sequence[Record]) -> tuple[CleanedRecord, ...]:
 def _prepared(raw: Record, constant: bool) -> CleanedRecord:
     record = _denoised(raw, constant=constant)
     run = cycles(record.time, record.displacement)
+    if constant and run is not None and temperature_moves(record.temperature):
+        record, run = _thinned(record, run)
     travel = np.abs(np.gradient(record.displacement))
     if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
         smoothed, draws = _smoothed_displacement(record)
@@ -131,6 +144,27 @@ def _prepared(raw: Record, constant: bool) -> CleanedRecord:
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
     lead = _with_lead(moved, early, motion(early))
     return CleanedRecord(moved, run, lead, constant, _monte_carlo_motions(lead, average), average)
+
+
+def _thinned(record: Record, run: Cycles) -> tuple[Record, Cycles]:
+    """Return every n-th sample of a record that repeats, with its cycles; itself where it has few."""
+    every = int(min(run.points(record.time) // SAMPLES_A_CYCLE, record.rate // LEAST_RATE))
+    if every < 2:
+        return record, run
+    fewer = sliced(record, np.arange(record.time.size) % every == 0)
+    found = cycles(fewer.time, fewer.displacement)
+    return (record, run) if found is None else (fewer, found)
+
+
+def temperature_moves(temperature: Array | None, by: float = MOVING_TEMPERATURE) -> bool:
+    """Whether a temperature (n,) changes by so much [K] from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(end_temperatures(temperature))) > by
+
+
+def end_temperatures(temperature: Array) -> tuple[float, float]:
+    """Return the temperature [degC] at the beginning and at the end of a test, with noise averaged out."""
+    tenth = max(temperature.size // 10, 1)
+    return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
 def _denoised(record: Record, *, constant: bool) -> Record:

@@ -58,7 +58,7 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
         at = "" if node is None else f" at {TERMINAL.amount(node, control.unit)}"
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
         if share:
-            grown = None if start is None or to is None else growth(start, to)
+            grown = None if start is None or to is None or row.unit == "degC" else growth(start, to)
             by = "" if grown is None else f", by {100.0 * grown:+.2g} %"
             told = by + (share if len(nodes) == 1 else ", as it was" if holds_what_was(row, i) else "")
         else:

@@ -96,9 +96,10 @@ class DamperModels:
 def _force(damper: Damper, record: Record, cleaned: Sequence[CleanedRecord]) -> Array:
     """Compute the (n,) force of a damper in a record, as judged in its cleaned parts [N]."""
     force = respond(damper, Motion.of(record), float(record.force[0]))
-    for part in cleaned:
-        first = int(np.argmin(np.abs(record.time - part.record.time[0])))
-        force[first : first + part.record.time.size] = predicted_force(damper, part)
+    for part in cleaned:  # it may have fewer samples
+        time = part.record.time
+        inside = (record.time >= time[0] - 0.5 / record.rate) & (record.time <= time[-1] + 0.5 / record.rate)
+        force[inside] = np.interp(record.time[inside], time, predicted_force(damper, part))
     return force
 
 

@@ -19,12 +19,11 @@ from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moment
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import effective_voltage
-from pzd.diagnosis.cleaned_records import CleanedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord, temperature_moves
 from pzd.diagnosis.fit.prediction import (
     PredictedForce,
     drawn_calm,
     simulation_motion,
-    temperature_moves,
     unresolved_turns,
 )
 from pzd.identification.prepared_record import in_motion

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pzd.damper.compose import jump_at_reversal, respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
-from pzd.diagnosis.cleaned_records import CleanedRecord
+from pzd.diagnosis.cleaned_records import CleanedRecord, temperature_moves
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Mask, Record, Rows
 from pzd.signals.jumps import beside_unresolved_reversals, jump_timing_error, jumps
@@ -24,10 +24,6 @@ PREDICTION_TOLERANCE = 1e-7
 
 Reason: far below `likelihood.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
 
-MOVING_TEMPERATURE = 0.5
-"""Change of temperature over a test [K] up to which it counts as its average cycle, at one temperature.
-
-Reason: about the resolution of a thermocouple; not tuned."""
 FIXED_TEMPERATURE = 0.05
 """Change of temperature over a test [K] up to which it is simulated at its median.
 
@@ -74,17 +70,6 @@ def simulation_motion(record: Record) -> tuple[Motion, Rows]:
         held = np.full(motion.temperature.size, np.median(motion.temperature))
         motion = replace(motion, temperature=held)
     return motion, places
-
-
-def temperature_moves(temperature: Array | None, by: float = MOVING_TEMPERATURE) -> bool:
-    """Whether a temperature (n,) changes by so much [K] from beginning to end; False where none was recorded."""
-    return temperature is not None and float(np.ptp(end_temperatures(temperature))) > by
-
-
-def end_temperatures(temperature: Array) -> tuple[float, float]:
-    """Return the temperature [degC] at the beginning and at the end of a test, with noise averaged out."""
-    tenth = max(temperature.size // 10, 1)
-    return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
 def comparable_samples(cleaned: CleanedRecord) -> NDArray[np.bool_]:

@@ -13,8 +13,8 @@ from pzd.damper.confounders import confounders, known
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library, nameable
 from pzd.diagnosis import thresholds
+from pzd.diagnosis.cleaned_records import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit, projected_out, refit
-from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.search.determination import force_at_rest, nearly_others
