@@ -421,6 +421,8 @@ DAMPERS = {
     "FR_3Hz_150V FL_3Hz_150V": "FL FR",
     "R10C5_0.5Hz R2C5_0.5Hz": "R10C5 R2C5",
     "reb2_0.5Hz reb10_0.5Hz": "reb10 reb2",
+    "t1_50psi t1_150psi": "150psi 50psi",
+    "2.5bar_1Hz 5bar_1Hz": "2.5bar 5bar",
 }
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from pzd.artefacts.table import PRESSURES
 from pzd.quantities import (
     ACCELERATION,
     CHANNELS,
@@ -276,8 +277,9 @@ _CLICKERS = (
     "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)",
     "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)",
     "(?i:(?:reb(?:ound)?|comp(?:ression)?|bump)[0-9]+)(?![.,][0-9])",
+    rf"[0-9]+(?:\.[0-9]+)?[ _-]?(?:{'|'.join(sorted(PRESSURES))})",
 )
-"""C08_R12, R12C8 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5, reb2."""
+"""C08_R12, R12C8 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5, reb2, 150psi."""
 STATES = re.compile(
     "(?i:(?<![a-z])(?:before|after|old|new|aged|worn|fresh|rebuilt|vorher|nachher|alt|neu|avant|apres|antes|despues)"
     "(?![a-z]))"
