@@ -10,14 +10,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
 from pzd.damper.compose import respond
 from pzd.damper.confounders import known
 from pzd.damper.effect import NODE_VOLTAGES, EffectValues, Parameter, Scales
-from pzd.damper.effects import library
+from pzd.damper.effects import accumulator, end_stop, library
 from pzd.damper.fitted_laws import fitted_laws, knee, seal
 from pzd.damper.model import BaseRow, Damper, acts_at_a_place, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
@@ -61,6 +61,10 @@ TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
 """Coordinate of a known temperature: 0 at that of the first state, 1 at that recorded in the second."""
+FAR = 0.5
+"""Share of the half stroke by which the middle of a stop at one side lies off.
+
+Reason: one that begins at 0.3 of the half stroke, where the first do, has its other end at 1.3."""
 LEAST_WARMING = 0.5
 """Difference of the mean temperatures [K] from which temperature is a candidate: the resolution of a thermocouple."""
 
@@ -99,6 +103,8 @@ class Coordinate:
     """Whether the first state has it not, so that a logarithmic coordinate of 0 is a change."""
     added: bool = False
     """Whether it adds to a parameter that differs by control signal, alike at all; else in proportion to it."""
+    side: int = 0
+    """1 or -1 of a stop that is reached in extension or in compression alone, 0 of all else."""
 
 
 @dataclass(frozen=True)
@@ -121,14 +127,20 @@ class Candidate:
         return any(c.node is not None for c in self.coordinates)
 
     @property
+    def side(self) -> int:
+        """That of its coordinates."""
+        return next((c.side for c in self.coordinates if c.side), 0)
+
+    @property
     def key(self) -> tuple[tuple[str, str], ...]:
         """What it changes."""
         return tuple(dict.fromkeys((c.name, c.parameter) for c in self.coordinates))
 
 
 def excludes(one: Candidate, other: Candidate) -> bool:
-    """Whether two candidates change the same quantity."""
-    return bool(set(one.key) & set(other.key)) or one.name == other.name
+    """Whether two candidates change the same quantity, or one is a stop at one side and both act at a place."""
+    placed = all(acts_at_a_place(each.name) for each in (one, other)) and (one.side or other.side)
+    return bool(set(one.key) & set(other.key)) or one.name == other.name or bool(placed)
 
 
 # --- The damper in which something changed
@@ -175,12 +187,29 @@ class FirstState:
         if knee.EFFECT.name in effects:
             effects[knee.EFFECT.name] = self._knees_beside(effects[knee.EFFECT.name], rows)
         damper = self.damper.model_copy(update={"base": base, "effects": effects})
-        if not placed:
-            return damper
-        damper = damper.about(self.middle_m)
+        return self._placed(damper, placed) if placed else damper
+
+    @property
+    def may_be_moved(self) -> bool:
+        """Whether the damper is the same about any zero of the displacement."""
+        beyond = self.middle_m + FAR * self.scales.stroke
+        return _counted_from(self.damper, beyond).zero_m == beyond
+
+    def _placed(self, damper: Damper, placed: Sequence[tuple[Coordinate, float]]) -> Damper:
+        """Return a damper with effects that act at a place of the stroke, about its middle.
+
+        The law of a stop has one at either end. Of one that is reached at one end alone the middle lies so far off that
+        the other is out of reach.
+        """
+        side = next((c.side for c, _ in placed if c.side), 0)
+        away = FAR * self.scales.stroke * abs(side)
+        zero = self.middle_m - side * away
+        damper = _counted_from(damper, zero) if side else damper.about(zero)
         effects = {name: dict(own) for name, own in damper.effects.items()}
         for c, x in placed:
             self._move_effect(effects, c, x)
+            if side and known_parameter(c.name, c.parameter).position:
+                effects[c.name][c.parameter] = cast("float", effects[c.name][c.parameter]) + away
         return damper.model_copy(update={"effects": effects})
 
     def _knees_beside(self, law: EffectValues, rows: Mapping[int, BaseRow]) -> dict[str, float | tuple[float, ...]]:
@@ -249,6 +278,24 @@ class FirstState:
         """Whether the effects that changed have physical values, as far as those of the first state had."""
         before = against_nature(without_laws(self.damper))
         return set(against_nature(without_laws(self.changed(coordinates, values, None)))) <= set(before)
+
+
+def _counted_from(damper: Damper, zero: float) -> Damper:
+    """Return the same damper about another zero of the displacement [m]; as it is where no values make up for that.
+
+    Equation: F_g (1 + (x + s)/L)^-n = F_g (1 + s/L)^-n (1 + x/(L + s))^-n
+    """
+    gas = accumulator.EFFECT.name
+    moved = damper.without_effects(gas).about(zero)
+    if gas not in damper.effects or moved.zero_m != zero:
+        return damper.about(zero)
+    own, by = dict(damper.effects[gas]), zero - damper.zero_m
+    force, length = np.asarray(own["F_g"]), np.asarray(own["L"])
+    if np.any(length + by <= 0.0):
+        return damper
+    values = {"F_g": force * (1.0 + by / length) ** -accumulator.POLYTROPIC, "L": length + by}
+    own |= {name: tuple(each.tolist()) if each.ndim else float(each) for name, each in values.items()}
+    return moved.model_copy(update={"effects": {**moved.effects, gas: own}})
 
 
 def frictions(damper: Damper) -> list[float]:
@@ -325,6 +372,8 @@ def candidates(first: FirstState, comparisons: Sequence[Comparison]) -> list[Can
         if effect.needs is not None or alone:
             continue
         found += _present(first, name) if present else [_absent(first, name)]
+        if name == end_stop.EFFECT.name and not present and first.may_be_moved:
+            found += [_at_one_side(found[-1], side) for side in (1, -1)]
         if present and name == knee.EFFECT.name:
             found += _parts_of_law(found)
     return [candidate for candidate in found if all(c.low < c.high for c in candidate.coordinates)]
@@ -411,6 +460,11 @@ def _absent(first: FirstState, name: str) -> Candidate:
     grid = itertools.product(*map(tried, effect.parameters))
     starts = tuple(tuple(searched(c, x) for c, x in zip(coordinates, given, strict=True)) for given in grid)
     return Candidate(name, "damper", tuple(coordinates), starts, True, _flexible(name))
+
+
+def _at_one_side(stop: Candidate, side: int) -> Candidate:
+    """Return a stop at one side alone, as a bump stop is."""
+    return replace(stop, coordinates=tuple(replace(c, side=side) for c in stop.coordinates))
 
 
 def _parts_of_law(found: Sequence[Candidate]) -> Iterator[Candidate]:

@@ -52,7 +52,7 @@ def reason_of(
     told = [f"{size}, {peak}, of which {left} N are left, {noise} N of them noise"]
     if of_damper:
         told.append(f"of the damper: {', '.join(of_damper)}")
-        told += [words for name in of_damper if (words := _kind_of_friction(found, name))]
+        told += [words for name in of_damper if (words := _kind_told(found, name))]
         told += _gas_before(found, of_damper)
         told += _by_law_told(found, of_damper)
         told += beside_effects(found, of_damper)
@@ -83,9 +83,11 @@ def reason_of(
 # --- What changed
 
 
-def _kind_of_friction(found: Findings, name: str) -> str | None:
-    """Say of a law that is newly there which friction it is, where its values tell; None of all others."""
+def _kind_told(found: Findings, name: str) -> str | None:
+    """Say of a law that is newly there of which kind it is, where its values tell; None of all others."""
     values = [(c, float(x)) for c, x in zip(found.best.coordinates, found.best.values, strict=True) if c.name == name]
+    if side := next((c.side for c, _ in values if c.side), 0):
+        return f"{name} acts in {'extension' if side > 0 else 'compression'} alone"
     if not all(c.absent for c, _ in values):
         return None
     if name == "second_branch":

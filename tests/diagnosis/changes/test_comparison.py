@@ -27,6 +27,7 @@ from pzd.artefacts.changes import Change
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.changes.candidates import _counted_from
 from pzd.diagnosis.changes.comparison import changes_between
 from pzd.diagnosis.changes.quantities import is_determined, is_little, may_be_as_before
 from pzd.diagnosis.changes.regression import SHARE_SCATTER, USUAL_SHARE, Scatter
@@ -364,6 +365,37 @@ def test_a_stop_stands_where_it_is_whatever_middle_the_tests_have(rng: np.random
     assert names(changes) == ["end_stop"]
     to = {c.parameter: c.to for c in changes.changes}
     assert to == pytest.approx(values, rel=0.1)
+
+
+def test_a_bump_stop_acts_at_one_end_alone(rng: np.random.Generator) -> None:
+    """By a law with a stop at either end 14.7 of 22 N had no name, and half of its force stood at the other end."""
+    damper = drawn_damper(rng, voltages=(0.0,)).with_effect("gas_spring", {"k_g": 900.0})
+    motions = (*MOTIONS, (1.0, 0.03))
+    touched = [
+        replace(record, force=record.force - 5e6 * np.maximum(-0.024 - record.displacement, 0.0) ** 2)
+        for record in campaign(damper, rng, motions)
+    ]
+    changes = found(campaign(damper, rng, motions), touched)
+    assert changes.verdict == "changed"
+    assert names(changes) == ["end_stop"]
+    assert "end_stop acts in compression alone" in changes.reason
+    begins = next(change for change in changes.changes if change.parameter == "x_e")
+    assert begins.from_ is None
+    assert begins.to == pytest.approx(0.024, abs=3e-4)
+    assert changes.difference.left_N < 0.15 * changes.difference.rms_N
+
+
+def test_a_gas_about_another_zero_is_the_same_gas(rng: np.random.Generator) -> None:
+    """A stop at one end counts from a middle that lies off, and the gas has to count from there too."""
+    gas = drawn_damper(rng, voltages=(0.0,)).with_effect("accumulator", {"F_g": 180.0, "L": 0.12})
+    gas = gas.with_effect("gas_spring", {"k_g": 700.0})
+    for zero in (-0.015, 0.02):
+        moved = _counted_from(gas, zero)
+        assert moved.zero_m == zero
+        for x in (-0.03, 0.0, 0.025):
+            motion = Motion(np.arange(3.0), np.full(3, x), np.zeros(3), np.zeros(3), np.zeros(3))
+            forces = [respond(each, motion, 0.0)[-1] for each in (gas, moved)]
+            assert forces[1] == pytest.approx(forces[0], rel=1e-9)
 
 
 def stepped(damper: Damper, rng: np.random.Generator, frequency: float) -> Record:
