@@ -105,8 +105,9 @@ def beside_effects(found: Findings, of_damper: Sequence[str]) -> list[str]:
     changed = [name for name in of_damper if name in ELEMENT_COLUMNS]
     if not names or not changed:
         return []
-    are = "are those" if len(changed) > 1 else "is that"
-    return [f"{' and '.join(changed)} {are} beside {', '.join(names)} of {found.before.name}, not those of identify"]
+    verb, those = ("are", "those") if len(changed) > 1 else ("is", "that")
+    beside = f"{', '.join(names)} of {found.before.name}"
+    return [f"{' and '.join(changed)} {verb} {those} beside {beside}, not {those} of identify"]
 
 
 def _gas_before(found: Findings, of_damper: Sequence[str]) -> list[str]:
