@@ -42,6 +42,13 @@ from pzd.report.diagnosis_text import next_test_line
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, MUTED, Panel, axes, encoded, legend, styled, ticks_named
 from pzd.report.page import render
 
+_COMPARED = {
+    "cycles": "Averaged cycles of the motions that were run in both states were compared.",
+    "model": "No motion was run in both states: the damper of the first stands for its tests.",
+    "both": "Averaged cycles were compared where a motion was run in both states, the damper of the first elsewhere.",
+}
+"""How the states were compared."""
+
 SHOWN = 3
 """Motions that are drawn, those with the largest difference: a row of loops, and below each what changes in it."""
 _FOOTER = "Written by pzd changes. Every number of this page stands in the JSON beside it, or in the records."
@@ -129,7 +136,11 @@ def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
     beside = "And something that has no name" if names and changes.verdict == "unexplained" else ""
     left = f"{amount(d.left_N, 'N')} of it are left, {amount(d.noise_N, 'N')} of them noise."
     found = [
-        Card("What changed?", names or _HEADLINES[changes.verdict], f"{beside or _HEADLINES[changes.verdict]}."),
+        Card(
+            "What changed?",
+            names or _HEADLINES[changes.verdict],
+            f"{beside or _HEADLINES[changes.verdict]}." if names else _COMPARED[changes.compared],
+        ),
         Card("How much?", size, left),
     ]
     if stand:
@@ -149,7 +160,7 @@ def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
 
 
 def _quantities(changes: Changes, control: Control) -> TextTable:
-    header = ("quantity", control.name, "before", "after", "95 % interval", "change", "size grew by", "share")
+    header = ("quantity", control.name, "before", "after", "95 % interval", "change", "of its size", "share")
     listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
     rows = [row for each in listed_rows for row in _rows(each, control)]
     title = (
@@ -242,9 +253,9 @@ def _difference(cycle: ComparedCycle, control: Control) -> Panel:
     figure, ax = axes("phase of the cycle", "difference [N]")
     phase = np.arange(cycle.displacement.size) / cycle.displacement.size
     whole = cycle.force_after - cycle.force_before
+    ax.plot(phase, whole - cycle.explained, color=MUTED, linewidth=2.5, label="left")  # below: it may be all of it
     ax.plot(phase, whole, color=BASELINE, label="difference")
     ax.plot(phase, cycle.explained, color=FINAL, linestyle="--", label="what the changes make")
-    ax.plot(phase, whole - cycle.explained, color=MUTED, label="left")
     legend(figure)
     name = _name(cycle, control)
     alt = f"Difference of the forces of {name} over the cycle, what the changes make of it, and what is left."
