@@ -63,7 +63,8 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
             told = by + (share if len(nodes) == 1 else ", as it was" if holds_what_was(row, i) else "")
         else:
             told = f", {TOO_SMALL}" if holds_what_was(row, i) is False else ""
-        yield f"{name}{at}: {TERMINAL.amount(start, row.unit)} -> {TERMINAL.amount(to)}{interval} {row.unit}{told}"
+        before = "" if start is None else f"{TERMINAL.amount(start, row.unit)} -> "  # newly there, or not known
+        yield f"{name}{at}: {before}{TERMINAL.amount(to)}{interval} {row.unit}{told}"
 
 
 def course_lines(found: Course, control: Control) -> Iterator[str]:
