@@ -172,7 +172,7 @@ def _state(given: Opened, name: str, setting: str | None, jobs: int) -> State:
 def _first_state(given: Opened, name: str, setting: str | None, jobs: int, say: Say) -> State:
     """Return a state with the damper that diagnose adopts, by its stage where that is about this setting."""
     state, config, control = _state(given, name, setting, jobs), given.config, given.run.control
-    if setting == setting_of_run(config, given.run):
+    if config.setting == setting or len({entry.setting for entry in given.run.read(Rig).entries}) == 1:
         execute(given, "diagnose", force=False, jobs=jobs, say=say)
         return with_adopted(state, given.run.read(Diagnosed))
     say(f"diagnose   runs in memory: it is about setting {setting}")

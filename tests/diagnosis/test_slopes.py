@@ -15,6 +15,7 @@ from pzd.damper.compose import respond, sensors_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.campaign import Campaign, evidence_of
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, prompt_force, shown_force
 from pzd.diagnosis.fit.problem import Problem
@@ -32,11 +33,11 @@ def two_tones(damper: Damper, tones: Sequence[tuple[float, float]], rng: Generat
     """Two tones of those amplitudes [m] and frequencies [Hz], sampled at 500 Hz, with 5 N of noise."""
     t = np.arange(0.0, 10.0, 1.0 / 500.0)
     x = np.sum([a * np.sin(2.0 * np.pi * f * t) for a, f in tones], axis=0)
-    clean = kinematics(t, x, None)
+    smooth = kinematics(t, x, None)
     volts = np.zeros(t.size)
-    force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts))
+    force = respond(damper, Motion(t, x, smooth.velocity, smooth.acceleration, volts))
     measured = force + 5.0 * rng.standard_normal(t.size)
-    tests = clean((Record("two tones", None, t, x, clean.velocity, clean.acceleration, measured, volts),))
+    tests = clean((Record("two tones", None, t, x, smooth.velocity, smooth.acceleration, measured, volts),))
     return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole
 
 
@@ -66,10 +67,10 @@ def whole(effects: dict[str, dict[str, float]], rng: Generator, *, moving: bool)
     warmth = np.full(t.size, 22.0) + (2.0 * t if "temperature_drift" in effects else 0.0)
     x = 0.02 * np.sin(2.0 * np.pi * t) + (0.004 * np.sin(2.0 * np.pi * 4.3 * t) if moving else 0.0)
     volts = 75.0 + 70.0 * np.sin(2.0 * np.pi * 0.7 * t) if moving else np.full(t.size, 150.0)
-    clean = kinematics(t, x, None)
-    force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts, warmth))
+    smooth = kinematics(t, x, None)
+    force = respond(damper, Motion(t, x, smooth.velocity, smooth.acceleration, volts, warmth))
     measured = force + 5.0 * rng.standard_normal(t.size)
-    record = Record("test", None, t, x, clean.velocity, clean.acceleration, measured, volts, warmth)
+    record = Record("test", None, t, x, smooth.velocity, smooth.acceleration, measured, volts, warmth)
     tests = clean((record,))
     return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole, damper
 

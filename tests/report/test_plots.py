@@ -12,6 +12,7 @@ import pytest
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnosis.cleaned_records import clean
 from pzd.diagnosis.fit.prediction import predicted_force
 from pzd.record import Array, Record
 from pzd.report.damper_models import DamperModels
@@ -53,12 +54,12 @@ def test_a_force_that_differs_only_until_the_motion_has_turned_leaves_no_gap() -
 def test_the_force_drawn_is_the_one_judged(rng: np.random.Generator) -> None:
     """Noise of 10 um through an oil spring of 3e6 N/m is a force of 30 N, which diagnose does not judge."""
     damper = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=1000.0, k_N_per_m=3e6),))
-    clean = sine(np.zeros(6000), frequency=2.0)
-    truth = respond(damper, Motion.of(clean), 0.0)
-    noisy = clean.displacement + 1e-5 * rng.standard_normal(clean.time.size)
-    velocity = np.gradient(noisy, clean.time)
+    still = sine(np.zeros(6000), frequency=2.0)
+    truth = respond(damper, Motion.of(still), 0.0)
+    noisy = still.displacement + 1e-5 * rng.standard_normal(still.time.size)
+    velocity = np.gradient(noisy, still.time)
     recorded = replace(
-        clean, displacement=noisy, velocity=velocity, acceleration=np.gradient(velocity, clean.time),
+        still, displacement=noisy, velocity=velocity, acceleration=np.gradient(velocity, still.time),
         force=truth + 2.0 * rng.standard_normal(truth.size),
     )  # fmt: skip
     diagnosed = SimpleNamespace(baseline=damper, damper=damper)

@@ -292,10 +292,11 @@ def _without_empty_columns(
     count = int(np.argmax(np.bincount(lines.fields)))  # that of nearly all rows; the others are told
     missing = header[count:]
     split_names = any(map(is_unit, header[1:]))
-    if entry.header is not None or entry.units_row or not missing or count < 2 or split_names:
+    event = entry.split is not None and entry.split.event in header
+    if entry.header is not None or entry.units_row or not missing or count < 2 or split_names or event:
         return header, []
-    if np.count_nonzero(lines.fields != count) > MOST_FAULTS:
-        return header, []
+    if np.count_nonzero(lines.fields != count) > MOST_FAULTS or np.any(lines.fields == len(header)):
+        return header, []  # some rows have them, as a label or an event at its beginning
     if lacking := [name for name in missing if name in wanted.known]:
         place = at(path, header_line)
         raise DataError([f"{place}: {name}: no row of the file has a field under this header" for name in lacking])
