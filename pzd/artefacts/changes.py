@@ -5,11 +5,13 @@ The models are the JSON of the command, key by key.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import ConfigDict, Field
 
 from pzd.artefacts.diagnosis import NextTest
+from pzd.damper.confounders import known
 from pzd.schema.model import Frozen
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -80,6 +82,23 @@ def values_at(row: Change | Unchanged, index: int) -> tuple[float | None, ...]:
 def value_at(values: Numbers, index: int) -> float | None:
     """Return a value at one of the control signals of a quantity."""
     return values[index] if isinstance(values, tuple) else values
+
+
+def had_no_value(row: Change | Unchanged, rows: Sequence[Change | Unchanged]) -> bool:
+    """Whether a quantity is that of an effect newly there, beside its strength: its first value is none of the damper.
+
+    The strength is the first parameter of an effect, and neutral where that is absent.
+
+    Parameters
+    ----------
+    row : the quantity
+    rows : all quantities told
+    """
+    effect = known().get(row.name)
+    if effect is None or row.parameter == (strength := effect.parameters[0]).name:
+        return False
+    firsts = (each.from_ for each in rows if (each.name, each.parameter) == (row.name, strength.name))
+    return any(first is None or first == strength.neutral for first in firsts)
 
 
 def growth(before: float, after: float) -> float | None:

@@ -13,6 +13,7 @@ from pzd.artefacts.changes import (
     CourseRow,
     Unchanged,
     growth,
+    had_no_value,
     holds_what_was,
     value_at,
     values_at,
@@ -162,7 +163,7 @@ def _cards(changes: Changes, control: Control) -> tuple[Card, ...]:
 def _quantities(changes: Changes, control: Control) -> TextTable:
     header = ("quantity", control.name, "before", "after", "95 % interval", "change", "of its size", "share")
     listed_rows: list[Change | Unchanged] = [*changes.changes, *changes.unchanged]
-    rows = [row for each in listed_rows for row in _rows(each, control)]
+    rows = [row for each in listed_rows for row in _rows(each, control, newly=had_no_value(each, listed_rows))]
     title = (
         "Each quantity before and after, with 95 % intervals; in % of its size; a share is that of all its values, and "
         "those without one did not change"
@@ -183,11 +184,12 @@ def _quantity(each: Change | Unchanged) -> str:
     return spelled(each.name) if each.name == each.parameter else f"{spelled(each.name)} {each.parameter}"
 
 
-def _rows(each: Change | Unchanged, control: Control) -> Iterator[tuple[str, ...]]:
+def _rows(each: Change | Unchanged, control: Control, *, newly: bool) -> Iterator[tuple[str, ...]]:
     count = len(each.at_voltage_V) if each.at_voltage_V is not None else 1
     name = _quantity(each)
     for i in range(count):
         start, to, low, high = values_at(each, i)
+        start = None if newly else start
         same = TOO_SMALL if holds_what_was(each, i) is False else DASH
         share = percent(each.share) if isinstance(each, Change) else same
         change = None if start is None or to is None else to - start

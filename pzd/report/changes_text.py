@@ -28,6 +28,7 @@ PASSES = {True: "yes", False: "no", None: "open, for something of it is not know
 
 def changes_lines(found: Changes, control: Control) -> Iterator[str]:
     """Yield what changed as lines of the terminal."""
+    from pzd.artefacts.changes import had_no_value
     from pzd.report.diagnosis_text import next_test_line
 
     yield f"from {found.from_} to {found.to}: {found.verdict}: {_VERDICTS[found.verdict]}"
@@ -36,7 +37,7 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
         if rows:
             yield f"{title}:"
         for row in rows:
-            yield from (f"  {line}" for line in _lines(row, control))
+            yield from (f"  {line}" for line in _lines(row, control, newly=had_no_value(row, rows)))
         shares = sum(change.share for change in found.changes)
         if title == "changed" and rows and not _WHOLE[0] <= shares <= _WHOLE[1]:
             yield f"  shares: {SHARES}; so they come to {'more' if shares > 1.0 else 'less'} than 100 % together"
@@ -44,7 +45,7 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
         yield next_test_line(found.next_test, control.unit)
 
 
-def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
+def _lines(row: Change | Unchanged, control: Control, *, newly: bool) -> Iterator[str]:
     from pzd.artefacts.changes import growth, holds_what_was, values_at
     from pzd.report.columns import TERMINAL
 
@@ -55,6 +56,7 @@ def _lines(row: Change | Unchanged, control: Control) -> Iterator[str]:
         yield f"{name} at {len(nodes)} control signals together{share}"
     for i, node in enumerate(nodes):
         start, to, low, high = values_at(row, i)
+        start = None if newly else start
         at = "" if node is None else f" at {TERMINAL.amount(node, control.unit)}"
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
         if share:

@@ -184,9 +184,7 @@ def _values(
         ends = np.sort([values_by_control(c, own, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0)], axis=0)
         return at, own, tuple(ends[1].tolist()), tuple(ends[0].tolist()), tuple(ends[2].tolist())
     neutral = known_parameter(c.name, c.parameter).neutral
-    # Of an effect that is newly there only the strength had a value before: none.
-    is_strength = known()[c.name].parameters[0].name == c.parameter
-    start_value = own if own is not None else (neutral if np.isfinite(neutral) and is_strength else None)
+    start_value = own if own is not None else (neutral if np.isfinite(neutral) else None)
     low, to, high = sorted(parameter_value(c, x + s * LEVEL * e) for s in (-1.0, 0.0, 1.0))
     if abs(to - neutral) < GONE * (high - low):
         to = neutral  # a fit ends a hair inside its limits
@@ -229,9 +227,9 @@ def _element_values(
 def _holds_what_was(change: Change) -> bool:
     """Whether the interval of a changed quantity holds its value in the first state, at every control signal.
 
-    What no test shows may be anything, and of what had no value before its strength speaks.
+    What no test shows may be anything.
     """
-    if change.to is None or change.from_ is None:
+    if change.to is None:
         return True
     nodes = range(len(change.at_voltage_V or (None,)))
     return all(holds_what_was(change, i) is True for i in nodes)  # of what no test shows none is held
