@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from html import unescape
 
 import numpy as np
@@ -98,3 +99,31 @@ def test_an_unchanged_quantity_whose_interval_leaves_its_first_value_out_is_call
 def test_why_shares_come_to_more_than_the_whole_is_said_where_they_do(shares: tuple[float, ...], told: int) -> None:
     said = "  shares: what is left without each, the others fitted again; so they come to more than 100 % together"
     assert list(changes_lines(found(shares=shares).changes, VOLTS)).count(said) == told
+
+
+def of_stop(parameter: str, before: float, to: float) -> Change:
+    return changed("end_stop", 0.9).model_copy(update={"parameter": parameter, "from_": before, "to": to})
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 2e6])
+def test_where_a_stop_begins_has_no_first_value_where_there_was_no_stop(stiffness: float) -> None:
+    """In the JSON it has the neutral value, `x_e 0.02 m`: no place of that damper."""
+    stop = (of_stop("k_e", stiffness, 5e6), of_stop("x_e", 0.02, 0.025))
+    compared = found()
+    compared = replace(compared, changes=compared.changes.model_copy(update={"changes": stop}))
+    (line,) = (each for each in changes_lines(compared.changes, VOLTS) if "end_stop x_e" in each)
+    assert ("0.02 N -> 0.025" in line) == (stiffness > 0.0)
+    assert ("by +25 %" in line) == (stiffness > 0.0)
+    assert cells(page_of(compared), "end stop x_e")[0] == ("0.02 N" if stiffness else "-")
+
+
+@pytest.mark.parametrize(("to", "said"), [(45.0, ", by -25 %, "), (-78.0, ") N, 90 % of")])
+def test_a_change_is_told_in_percent_of_what_was_where_its_sign_stays(to: float, said: str) -> None:
+    compared = found()
+    change = changed("T0", 0.9).model_copy(update={"to": to})
+    (line,) = (
+        each
+        for each in changes_lines(compared.changes.model_copy(update={"changes": (change,)}), VOLTS)
+        if "T0:" in each
+    )
+    assert said in line
