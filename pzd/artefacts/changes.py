@@ -11,7 +11,7 @@ from typing import Literal
 from pydantic import ConfigDict, Field
 
 from pzd.artefacts.diagnosis import NextTest
-from pzd.damper.confounders import known
+from pzd.damper.effects import library
 from pzd.schema.model import Frozen
 
 Verdict = Literal["changed", "unchanged", "ambiguous", "unexplained"]
@@ -94,7 +94,7 @@ def had_no_value(row: Change | Unchanged, rows: Sequence[Change | Unchanged]) ->
     row : the quantity
     rows : all quantities told
     """
-    effect = known().get(row.name)
+    effect = library().get(row.name)
     if effect is None or row.parameter == (strength := effect.parameters[0]).name:
         return False
     firsts = (each.from_ for each in rows if (each.name, each.parameter) == (row.name, strength.name))

@@ -67,7 +67,7 @@ LARGEST_FORCE = 1.0e8
 
 Reason: ten times that of the largest ones, in bridges; a value beyond is in another unit."""
 LARGEST_DAMPING = 1.0e9
-"""Of any damper [N s/m]: that of the largest ones at 10 mm/s."""
+"""Of any damper [N s/m]: a tenth of that force, as of the largest ones, at 10 mm/s."""
 LARGEST_SQUARE = 1.0e12
 """Force over the square of the speed of any damper [N s2/m2]: the largest force at 10 mm/s."""
 STIFFEST_BESIDE = 1.0e11

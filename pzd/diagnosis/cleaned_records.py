@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,10 +44,12 @@ Reason: about the resolution of a thermocouple; not tuned."""
 SAMPLES_A_CYCLE = 200
 """Samples in a cycle of a test in which the damper warms: each counts by itself, and more tell no more of its law.
 
-Reason: eight times those that a half cycle needs (`FEWEST_IN_HALF_CYCLE`); a slow test at 1 kHz has 2000, and took ten
-times as long."""
+Reason: four times those that a half cycle needs (`FEWEST_IN_HALF_CYCLE`) in each; a slow test at 1 kHz has 2000, and
+took ten times as long."""
 LEAST_RATE = 250.0
-"""Least rate of such a test [Hz]: below it hum of the mains would pass for something slower."""
+"""Least rate of such a test [Hz].
+
+Reason: a jump of the friction, or the hum of the mains, is as far from a slow law as at the rates of loggers."""
 REPEATING_SHARE = 0.5
 """Share of the travel that the repeating run must hold, else the record counts as not repeating; rest before and after
 does not count."""
@@ -111,11 +114,18 @@ def centred_on(cleaned: Sequence[CleanedRecord], zero: float) -> tuple[CleanedRe
     )
 
 
-def clean(records: Sequence[Record]) -> tuple[CleanedRecord, ...]:
-    """Clean every record of one rig; several tests in one record become several records of its name."""
+def clean(records: Sequence[Record], *, every_sample: bool = False) -> tuple[CleanedRecord, ...]:
+    """Clean every record of one rig; several tests in one record become several records of its name.
+
+    Parameters
+    ----------
+    records : of one rig
+    every_sample : whether a test in which the damper warms keeps its samples, for averages of its cycles
+    """
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
-    found = [_prepared(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))]
+    tests = [(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))]
+    found = [_cleaned(test, constant, thinned=not every_sample) for test, constant in tests]
     averages = [p.average for p in found if p.average is not None]
     return tuple(
         p if p.average is None else replace(p, read_alike=max(sum(map(p.average.read_alike, averages)), 1))
@@ -123,15 +133,15 @@ def clean(records: Sequence[Record]) -> tuple[CleanedRecord, ...]:
     )
 
 
-def _prepared(raw: Record, constant: bool) -> CleanedRecord:
+def _cleaned(raw: Record, constant: bool, *, thinned: bool) -> CleanedRecord:
     record = _denoised(raw, constant=constant)
     run = cycles(record.time, record.displacement)
-    if constant and run is not None and temperature_moves(record.temperature):
-        record, run = _thinned(record, run)
     travel = np.abs(np.gradient(record.displacement))
     if run is None or travel[run.inside(record.time)].sum() < REPEATING_SHARE * travel.sum():
         smoothed, draws = _smoothed_displacement(record)
         return CleanedRecord(smoothed, None, None, constant, draws)
+    if constant and thinned and temperature_moves(sliced(record, run.inside(record.time)).temperature):
+        record, run = _thinned(record, run)
     average = AverageCycle.of(record.time, record.displacement, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
@@ -147,11 +157,23 @@ def _prepared(raw: Record, constant: bool) -> CleanedRecord:
 
 
 def _thinned(record: Record, run: Cycles) -> tuple[Record, Cycles]:
-    """Return every n-th sample of a record that repeats, with its cycles; itself where it has few."""
+    """Return the means of every n samples of a record that repeats, with its cycles; itself where it has few.
+
+    The mean has nothing of what would fold into a level, as a harmonic of the mains at the new rate, and all that the
+    samples know of a slow law beneath white noise.
+    """
     every = int(min(run.points(record.time) // SAMPLES_A_CYCLE, record.rate // LEAST_RATE))
     if every < 2:
         return record, run
-    fewer = sliced(record, np.arange(record.time.size) % every == 0)
+
+    def means(values: Array) -> Array:
+        whole = values[: values.size // every * every]
+        return np.asarray(whole.reshape(-1, every).mean(axis=1))
+
+    channels: dict[str, Any] = {
+        name: means(values) for name, values in vars(record).items() if isinstance(values, np.ndarray)
+    }
+    fewer = replace(record, **channels)
     found = cycles(fewer.time, fewer.displacement)
     return (record, run) if found is None else (fewer, found)
 

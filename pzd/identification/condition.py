@@ -9,7 +9,7 @@ of the element alone. The damper that identify hands on has neither: diagnose na
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,8 +124,11 @@ def fit_with_auxiliary(
     values = values + auxiliary_remainder(objective, fit)
     objective = without_auxiliary_force(whole, values)
     fit = descend(objective, fit.parameters)
-    alone = whole.fitted_by_record(element_alone.parameters)
-    missed = trust.misfit_of(fitted_records(records, whole.prepared, alone, config.nuisance))
+
+    def missed() -> trust.Misfit:
+        alone = whole.fitted_by_record(element_alone.parameters)
+        return trust.misfit_of(fitted_records(records, whole.prepared, alone, config.nuisance))
+
     auxiliary = significant_auxiliary(records, objective, fit, values, config.nuisance, missed)
     return (whole, element_alone, None) if auxiliary is None else (objective, fit, auxiliary)
 
@@ -390,7 +393,7 @@ def significant_auxiliary(
     fit: Fit,
     values: Array,
     nuisance: NuisanceConfig,
-    missed: trust.Misfit,
+    missed: Callable[[], trust.Misfit],
 ) -> Auxiliary | None:
     """Return the forces with their intervals; None where the tests do not show them.
 
@@ -404,7 +407,7 @@ def significant_auxiliary(
     fit : the optimum
     values : (2,) forces that were subtracted, so that no remainder is left
     nuisance : standard deviations of what differs from test to test
-    missed : by the element alone
+    missed : gives the misfit of the element alone
     """
     columns, middle = auxiliary_columns(objective)
     slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1] * objective.weight[:, None], columns])
@@ -412,9 +415,10 @@ def significant_auxiliary(
     fitted = fitted_records(records, objective.prepared, by_record, nuisance)
     misfit = trust.misfit_of(fitted)
     widths = half_widths(fitted, misfit)[3:]
-    closed = missed.share > 0.0 and misfit.share == 0.0
-    wide = widths if closed else half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]
-    return Auxiliary(values, widths, middle) if np.any(np.abs(values) > wide) else None
+    certain = np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:])
+    if not certain and not (np.any(np.abs(values) > widths) and misfit.share == 0.0 and missed().share > 0.0):
+        return None
+    return Auxiliary(values, widths, middle)
 
 
 def subtract_auxiliary(record: Record, auxiliaries: Sequence[AuxiliaryRow]) -> Record:

@@ -484,7 +484,7 @@ def force_changes(forces: Sequence[KneeForceRow], control: Control) -> tuple[tup
             if axis.unit:
                 cells = {"unit": axis.unit, "from_value": low, "to_value": high}
                 cells |= {"rebound_N_per_unit": changes[0], "compression_N_per_unit": changes[1]}
-                told = before.gas_force_N != 0.0 or after.gas_force_N != 0.0
+                told = before.gas_force_N != 0.0 and after.gas_force_N != 0.0
                 gas = (after.gas_force_N - before.gas_force_N) / (high - low) if told else None
                 units.append(UnitRow.model_validate({**labels, **cells, "gas_force_N_per_unit": gas}))
             else:

@@ -169,13 +169,21 @@ def _state(given: Opened, name: str, setting: str | None, jobs: int) -> State:
     return State.of(name, rig, identified, setting, given.run.control)
 
 
+def _is_in_use(given: Opened, setting: str | None) -> bool:
+    """Whether a setting is the one that diagnose is about; of several none is, where the config names none."""
+    try:
+        return setting_of_run(given.config, given.run) == setting
+    except ConfigError:
+        return False
+
+
 def _first_state(given: Opened, name: str, setting: str | None, jobs: int, say: Say) -> State:
     """Return a state with the damper that diagnose adopts, by its stage where that is about this setting."""
     state, config, control = _state(given, name, setting, jobs), given.config, given.run.control
-    if config.setting == setting or len({entry.setting for entry in given.run.read(Rig).entries}) == 1:
+    if _is_in_use(given, setting):
         execute(given, "diagnose", force=False, jobs=jobs, say=say)
         return with_adopted(state, given.run.read(Diagnosed))
-    say(f"diagnose   runs in memory: it is about setting {setting}")
+    say(f"diagnose   runs in memory: {setting} is not the setting in use")
     rig, identified = given.run.read(Rig, jobs), given.run.read(Identified)
     return diagnosed_state(
         state, rig, identified, setting, config.diagnose, config.identify, config.measured_rig, control, jobs

@@ -20,8 +20,8 @@ SHARES = "what is left without each, the others fitted again"
 """What the shares of the changes are."""
 TOO_SMALL = "too small to matter"
 """Of an unchanged quantity whose interval leaves its first value out: the force does not show it visibly."""
-_WHOLE = (0.9, 1.005)
-"""Sums of the shares between which the terminal need not say why they are not 100 %."""
+_WHOLE = 1.005
+"""Sum of the shares from which on the terminal says why they are more than 100 %: below it they round to it."""
 PASSES = {True: "yes", False: "no", None: "open, for something of it is not known"}
 """Words for whether all quantities lie within their limits."""
 
@@ -38,11 +38,15 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
             yield f"{title}:"
         for row in rows:
             yield from (f"  {line}" for line in _lines(row, control, newly=had_no_value(row, rows)))
-        shares = sum(change.share for change in found.changes)
-        if title == "changed" and rows and not _WHOLE[0] <= shares <= _WHOLE[1]:
-            yield f"  shares: {SHARES}; so they come to {'more' if shares > 1.0 else 'less'} than 100 % together"
+        if title == "changed" and sum(change.share for change in found.changes) > _WHOLE:
+            yield f"  shares: {SHARES}; so they come to more than 100 % together"
     if found.next_test:
         yield next_test_line(found.next_test, control.unit)
+
+
+def _in_percent(share: float) -> str:
+    """Return a growth in percent: whole ones from ten on."""
+    return f"{100.0 * share:+.0f} %" if abs(share) >= 0.1 else f"{100.0 * share:+.2g} %"
 
 
 def _lines(row: Change | Unchanged, control: Control, *, newly: bool) -> Iterator[str]:
@@ -61,7 +65,7 @@ def _lines(row: Change | Unchanged, control: Control, *, newly: bool) -> Iterato
         interval = f" ({TERMINAL.amount(low)} to {TERMINAL.amount(high)})" if low is not None else ""
         if share:
             grown = None if start is None or to is None or row.unit == "degC" else growth(start, to)
-            by = "" if grown is None else f", by {100.0 * grown:+.2g} %"
+            by = "" if grown is None else f", by {_in_percent(grown)}"
             told = by + (share if len(nodes) == 1 else ", as it was" if holds_what_was(row, i) else "")
         else:
             told = f", {TOO_SMALL}" if holds_what_was(row, i) is False else ""

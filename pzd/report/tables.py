@@ -287,7 +287,7 @@ def _force_at(place: int, speed: float) -> Column:
 
 
 UNKNOWN = "not shown"
-"""Of a number of the knee law whose interval reaches as far as the search."""
+"""Of a number of the knee law whose interval reaches far beyond what the tests did."""
 
 
 def _estimated(column: str, head: str, unit: str, *, optional: bool = False) -> Column:

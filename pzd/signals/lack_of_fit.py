@@ -164,7 +164,8 @@ def fit_smooth_residual(
     Wandering noise hides a level or a slow term: terms that the samples hardly determine are shrunk, each of p being
     expected to explain as much as any other.
 
-    Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
+    Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual, of p and n_i - p degrees of freedom,
+    n_i the independent samples, which tell the colour                               Source: Aitken 1935, Fisher
     Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
                                                                             Source: Hoerl and Kennard 1970
     Errors of the motion make a force that is as smooth as a misfit, and are in the terms as well. What the model takes
@@ -193,6 +194,9 @@ def fit_smooth_residual(
     for _ in range(WHITENING_ROUNDS):
         noise = autoregression(split_at_gaps(residual - explained, counted)).with_white(QUIETEST)
         whole = has_predecessors(counted, noise.coefficients.size)
+        if np.count_nonzero(whole) <= basis.shape[1] + noise.coefficients.size:  # short stretches tell no colour
+            noise = Autoregression(np.zeros(0), noise.variance)
+            whole = has_predecessors(counted, 0)
         flat = noise.whitened(residual)[whole]
         whitened = noise.whitened(basis)[whole]
         _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
@@ -205,7 +209,7 @@ def fit_smooth_residual(
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
     # The colour is known by as many samples as are independent of each other, and no better.
-    known_by = float(np.clip(noise.independent(flat.size) - rank, 1.0, free))
+    known_by = float(np.clip(noise.independent(flat.size) - rank, 1.0, max(free, 1)))
     over = float(flat @ flat - taken @ taken)
     # QUIETEST adds white noise that may not be there: then the remainder is smaller than expected.
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)

@@ -151,14 +151,20 @@ class Autoregression:
         response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
         return np.asarray(self.innovation / np.abs(response) ** 2)
 
-    def independent(self, samples: int) -> float:
-        """Return how many of some samples count as independent of each other.
+    def independent(self, samples: int, largest: float | None = None) -> float:
+        """Return how many of some samples tell the colour of the noise: those that are independent of each other.
 
-        Equation: n var / S_max, S_max at least 5 var                                   Source: Bartlett 1946
+        Equation: n var / S_max, S_max at least 5 var: a short record hides colour
+
+        Parameters
+        ----------
+        samples : their number
+        largest : density S_max; None for that of this noise at any frequency
         """
         if self.variance <= 0.0:
             return float(samples)
-        return samples / max(float(np.max(self._density_on_grid)) / self.variance, LEAST_COLOUR)
+        most = float(np.max(self._density_on_grid)) if largest is None else largest
+        return samples / max(most / self.variance, LEAST_COLOUR)
 
     @property
     def whitening_filter(self) -> Array:
@@ -348,7 +354,7 @@ def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, s
     largest = float(density.max())
     if noise.variance <= 0.0 or largest <= 0.0:
         return freedom
-    independent = samples / max(largest / noise.variance, LEAST_COLOUR)
+    independent = noise.independent(samples, largest)
     return np.asarray(2.0 / (2.0 / freedom + 4.0 / independent * density / largest))
 
 

@@ -160,12 +160,24 @@ def test_a_test_in_which_the_damper_warms_has_as_many_samples_a_cycle_as_its_law
     assert alike.record.rate == pytest.approx(rate)
     assert warming_up.record.rate == pytest.approx(left)
     at = warming_up.record.time
-    np.testing.assert_allclose(warming_up.record.force, np.interp(at, still.time, still.force), rtol=1e-9)
+    assert clean((warm,), every_sample=True)[0].record.rate == pytest.approx(rate)
     predicted = [predicted_force(damper_of((0.0,)), each) for each in (alike, warming_up)]
     peak = float(np.max(np.abs(predicted[0])))
     both = (at >= alike.record.time[0]) & (at <= alike.record.time[-1])  # either may leave out a cycle that settles
     same = np.interp(at[both], alike.record.time, predicted[0])
     np.testing.assert_allclose(predicted[1][both], same, atol=2e-3 * peak)
+
+
+def test_hum_of_the_mains_folds_into_no_force_of_a_test_that_is_thinned(rng: Generator) -> None:
+    """Every fourth sample of 1 kHz made of 5 N at 250 Hz, a harmonic of 50 Hz, a preload of 4.8 N."""
+    still = sine(damper_of((0.0,)), 0.0, 0.5, 0.02, rng, noise=0.0, cycles=6)
+    hum = 5.0 * np.cos(2.0 * np.pi * 250.0 * still.time)
+    warm = replace(still, force=still.force + hum, temperature=22.0 + 2.0 * still.time / still.time[-1])
+    (cleaned,) = clean((warm,))
+    assert cleaned.record.rate == pytest.approx(250.0)
+    assert cleaned.cycles is not None
+    left = cleaned.cycles.mean(cleaned.record.time, cleaned.record.force)
+    assert abs(float(np.mean(left)) - float(np.mean(still.force[: still.time.size // 2000 * 2000]))) < 0.5
 
 
 # --- Steps and noise of a displacement that does not repeat, or repeats with its steps

@@ -117,7 +117,9 @@ def test_where_a_stop_begins_has_no_first_value_where_there_was_no_stop(stiffnes
     assert cells(page_of(compared), "end stop x_e")[0] == ("0.02 N" if stiffness else "-")
 
 
-@pytest.mark.parametrize(("to", "said"), [(45.0, ", by -25 %, "), (-78.0, ") N, 90 % of")])
+@pytest.mark.parametrize(
+    ("to", "said"), [(45.0, ", by -25 %, "), (130.0, ", by +117 %, "), (0.0, ", by -100 %, "), (-78.0, ") N, 90 % of")]
+)
 def test_a_change_is_told_in_percent_of_what_was_where_its_sign_stays(to: float, said: str) -> None:
     compared = found()
     change = changed("T0", 0.9).model_copy(update={"to": to})

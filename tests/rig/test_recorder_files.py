@@ -18,12 +18,13 @@ import pytest
 import yaml
 
 from pzd.config import load
-from pzd.quantities import Control
+from pzd.quantities import DISPLACEMENT, VELOCITY, Control
 from pzd.record import Array
 from pzd.rig.config import FilesEntry, RigConfig
 from pzd.rig.files.guess import guessed
+from pzd.rig.files.sniffing import quantity_of
 from pzd.rig.stage import ingest
-from pzd.schema.errors import DataError
+from pzd.schema.errors import ConfigError, DataError
 
 RATE, SAMPLES = 500.0, 1000
 TIME = np.arange(SAMPLES) / RATE
@@ -572,19 +573,33 @@ def test_the_last_column_of_a_header_may_have_no_field_in_any_row(tmp_path: Path
     np.testing.assert_allclose(record.displacement, X, atol=1e-6)
 
 
-def test_a_column_that_is_asked_for_and_has_no_field_is_refused(tmp_path: Path) -> None:
+def test_which_names_have_no_field_is_for_a_person_to_say_and_the_advice_reads_the_file(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("\n".join(BOARD) + "\n", encoding="utf-8")
     columns = {"time": "Millis", "displacement": "Linear_Pot (scaled)", "force": "Load_Cell"}
-    with pytest.raises(DataError, match=r"b\.csv:1: Thermocouple: no row of the file has a field under this header"):
-        board(tmp_path, BOARD[1:], columns={**columns, "temperature": "Thermocouple"})
+    entry = {"path": "b.csv", "columns": columns, "units": {"time": "ms", "displacement": "mm", "force": "N"}}
+
+    def read_by(**more: object) -> Any:
+        return ingest(RigConfig.model_validate_json(json.dumps({"files": [{**entry, **more}]})), Control(), tmp_path)
+
+    with pytest.raises(DataError) as refused:
+        read_by()
+    told = (
+        r"b\.csv:1: the header has 4 names, and the rows have 3 fields; where the last names have none \(Thermocouple\)"
+    )
+    advised = re.search(told + r", say skip: (\d+) and header: \[(.*)\]$", str(refused.value))
+    assert advised is not None
+    (record,) = read_by(skip=int(advised[1]), header=advised[2].split(", ")).records
+    np.testing.assert_allclose(record.force, FORCE, atol=1e-3)
 
 
-def test_a_name_with_the_separator_in_it_shifts_no_column(tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["t,Force, N,pos,temp", "t,Force,pos, filtered,temp"])
+def test_a_name_with_the_separator_in_it_shifts_no_column(tmp_path: Path, head: str) -> None:
     """`Force, N` without quotes is two names: the displacement would be read under that of the next column."""
-    rows = ["t,Force, N,pos,temp", *(f"{t:.3f},{f:.4f},{x:.5f},20" for t, x, f in zip(TIME, MM, FORCE, strict=True))]
+    rows = [head, *(f"{t:.3f},{f:.4f},{x:.5f},20" for t, x, f in zip(TIME, MM, FORCE, strict=True))]
     (tmp_path / "n.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     entry = {"path": "n.csv", "columns": {"time": "t", "displacement": "pos", "force": "Force"}}
     said = {"files": [{**entry, "units": {"time": "s", "displacement": "mm", "force": "N"}}]}
-    with pytest.raises(DataError, match="4 fields where the header has 5"):
+    with pytest.raises(DataError, match="the header has 5 names, and the rows have 4 fields"):
         ingest(RigConfig.model_validate_json(json.dumps(said)), Control(), tmp_path)
 
 
@@ -597,4 +612,32 @@ def test_the_key_that_is_advised_leaves_a_message_among_the_rows_out(tmp_path: P
     assert advised is not None
     rig = board(tmp_path, rows, leave_out=advised[1])
     np.testing.assert_allclose(rig.records[0].force, FORCE, atol=1e-3)
-    assert any("'Switched from 8 to 9' is found" in str(row) for row in rig.ingested)
+    assert any("1 line in which 'Switched from 8 to 9' is found" in str(row) for row in rig.ingested)
+
+
+def test_lines_that_are_left_out_are_counted_by_what_leaves_them_out(tmp_path: Path) -> None:
+    rows = [*BOARD[1:200], "# a comment", *BOARD[200:], "9999,overload,"]
+    rig = board(tmp_path, rows, leave_out="overload", comment="#")
+    told = "".join(str(row) for row in rig.ingested)
+    assert "1 line in which 'overload' is found" in told
+    assert "1 line that begin with '#'" in told
+
+
+def test_a_key_that_a_format_does_not_know_is_refused(tmp_path: Path) -> None:
+    rows = [{"t": t, "x": x, "F": f} for t, x, f in zip(TIME, X, FORCE, strict=True)]
+    (tmp_path / "b.json").write_text(json.dumps(rows), encoding="utf-8")
+    entry = {"path": "b.json", "columns": {"time": "t", "displacement": "x", "force": "F"}, "leave_out": "x"}
+    said = {"files": [{**entry, "units": {"time": "s", "displacement": "m", "force": "N"}}]}
+    with pytest.raises(ConfigError, match="leave_out"):
+        ingest(RigConfig.model_validate_json(json.dumps(said)), Control(), tmp_path)
+
+
+@pytest.mark.parametrize("head", ["Motor speed (rpm)", "Velocidad_RPM", "rpm_velocity"])
+def test_the_speed_of_a_motor_is_not_that_of_the_damper(head: str) -> None:
+    assert quantity_of(head, None, Control()) is not VELOCITY
+
+
+def test_a_pot_is_a_displacement_and_its_temperature_none() -> None:
+    assert quantity_of("Linear_Pot (scaled)", None, Control()) is DISPLACEMENT
+    assert quantity_of("LinPot", None, Control()) is DISPLACEMENT
+    assert quantity_of("pot_temp", None, Control()) is not DISPLACEMENT

@@ -134,7 +134,7 @@ class Findings:
         """Whether what a fit leaves may be seen: where the model stands for every test, beyond what that may miss.
 
         Of a difference that is hardly visible itself the error of the model makes up any share, and it is not the same
-        in every test: of a few, half as much again is chance.
+        in every test: up to an interval of it is chance.
         """
         if any(c.before is not None for c in self.comparisons):
             return True

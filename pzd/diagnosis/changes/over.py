@@ -112,8 +112,9 @@ def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], contro
     """Return the quantities that changed in any state, T0 and C over the states, fitted together in each."""
     values: dict[tuple[str, str], list[tuple[Numbers, Numbers, Numbers]]] = {}
     starts: dict[tuple[str, str], tuple[Numbers, str, tuple[float, ...] | None]] = {}
+    sides = {c.name: c.side for each in found for c in each.best.candidates}
     for number, each in enumerate(found):
-        for change in refitted(each, _together_with(each, adopted)):
+        for change in refitted(each, _together_with(each, adopted, sides)):
             key = (change.name, change.parameter)
             if key not in values:
                 values[key] = [(None, None, None)] * number
@@ -132,11 +133,11 @@ def _quantities(found: Sequence[Findings], adopted: set[tuple[str, str]], contro
     return rows
 
 
-def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candidate]:
+def _together_with(found: Findings, adopted: set[tuple[str, str]], sides: Mapping[str, int]) -> list[Candidate]:
     """Return the candidates of a pair of states that are fitted together: its own, and the others that are followed.
 
     T0 is always followed, C where it changed in any state or these two would have shown it. A gain that cannot be told
-    from T0, C and k of one level is theirs in every state, where they changed in one.
+    from T0, C and k of one level is theirs in every state, where they changed in one; a stop keeps its side.
     """
     changed = any(name in ELEMENT_COLUMNS for name, _ in adopted)
     theirs = changed and not any(c.per_voltage for c in found.search.candidates)
@@ -144,7 +145,8 @@ def _together_with(found: Findings, adopted: set[tuple[str, str]]) -> list[Candi
     followed = adopted | {("T0", "T0")} | {(u.name, u.parameter) for u in changes_of(found).unchanged if u.name == "C"}
     for candidate in found.search.candidates:
         have = {key for c in chosen for key in c.key}
-        if set(candidate.key) <= followed and not set(candidate.key) & have and not candidate.per_voltage:
+        new = set(candidate.key) <= followed and not set(candidate.key) & have
+        if new and not candidate.per_voltage and candidate.side == sides.get(candidate.name, 0):
             chosen.append(candidate)
     return chosen
 

@@ -210,12 +210,12 @@ def _element_values(
         at([x + s * LEVEL * e for (_, x, _), e in zip(mine, shown, strict=True)]) for s in (0.0, -1.0, 1.0)
     )
     unseen = {c.node for c, _, e in mine if not np.isfinite(e)}
-    known = [None not in unseen and (v is None or nearest_node(groups, v) not in unseen) for v in voltages]
+    seen = [None not in unseen and (v is None or nearest_node(groups, v) not in unseen) for v in voltages]
     least, most = [*map(min, one, other)], [*map(max, one, other)]
     if c.name == "T0":  # a fit ends a hair inside its limit of none
         after = [0.0 if to < GONE * (high - low) else to for to, low, high in zip(after, least, most, strict=True)]
     columns = (after, least, most)
-    to, low, high = (tuple(v if k else None for v, k in zip(column, known, strict=True)) for column in columns)
+    to, low, high = (tuple(v if k else None for v, k in zip(column, seen, strict=True)) for column in columns)
     if len(groups) < 2 or len(voltages) < 2:
         return None, start[0], to[0], low[0], high[0]
     return tuple(cast("list[float]", voltages)), tuple(start), to, low, high

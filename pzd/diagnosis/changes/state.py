@@ -40,7 +40,7 @@ class State:
         rows = [row for row in identified.undetermined if row.setting == setting]
         lacking = [f"{row.words(control, name)}: {row.status}" for row in rows]
         damper = identified_damper(identified, setting)
-        return cls(name, clean(records), damper, voltage_scale(records), tuple(lacking))
+        return cls(name, clean(records, every_sample=True), damper, voltage_scale(records), tuple(lacking))
 
     @property
     def records(self) -> list[Record]:

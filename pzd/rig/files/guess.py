@@ -177,7 +177,7 @@ class SniffedFile:
             d.decimal,
             d.skip,
             d.encoding,
-            d.headless or d.apart,
+            d.headless or d.apart or bool(d.without_fields),
             tuple(kind),
             None if TIME in dict(self.columns) else _rate(self),
         )
@@ -528,6 +528,9 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
             "blanks stand in the headers of the file" if dialect.separator == BLANKS else "from further up in the file"
         )
         yield f"header: [{', '.join(map(written, dialect.header))}]    # {why}"
+    if dialect.without_fields:
+        missing = ", ".join(filter(None, dialect.without_fields)) or "an empty name"
+        yield f"header: [{', '.join(map(written, dialect.header))}]    # without {missing}: no row has so many fields"
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
     if dialect.decimal == ",":

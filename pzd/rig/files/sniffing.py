@@ -56,10 +56,10 @@ _LOOKS_LIKE = {
     r"|time|clock|zeit|\btemps\b|tiempo|\btempo\b|^czas|^second|^sek"
     r"|\u65f6\u95f4|\u6642\u9593|^\u0432\u0440\u0435\u043c",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera"
-    r"|(?<![a-z])pot(?![a-z])|potentiom|recorrido|spostament|corsa|desloca|^curso|przemieszcz|^skok"
+    r"|(?:(?<![a-z])|lin|linear|string)pot(?![a-z])(?!.*(?:temp|volt))|potentiom|recorrido|spostament|corsa|desloca|^curso|przemieszcz|^skok"
     r"|\u043f\u0435\u0440\u0435\u043c\u0435\u0449|\u0441\u043c\u0435\u0449|^\u0445\u043e\u0434"
     r"|\u4f4d\u79fb|\u884c\u7a0b|\u5909\u4f4d|\u30b9\u30c8\u30ed\u30fc\u30af",
-    VELOCITY: r"^v$|vel(?!.*rpm)|speed(?!.*rpm)|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6"
+    VELOCITY: r"^v$|vel|speed|geschw|vitesse|pr[eę]dko|(?<!\u52a0)\u901f\u5ea6"
     r"|\u0441\u043a\u043e\u0440\u043e\u0441\u0442",
     ACCELERATION: r"^a$|acc|beschl|acel|przyspiesz|\u52a0\u901f\u5ea6",
     FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga|forza|carico|^si[lł]a|(?<![\u538b\u5727])\u529b"
@@ -222,7 +222,7 @@ def quantity_of(header: str, below: str | None, control: Control) -> Quantity | 
         return meant
     bare = _bare(header)
     for quantity in (FORCE, DISPLACEMENT, VELOCITY, ACCELERATION, TIME, TEMPERATURE, PRESSURE):
-        if re.search(_LOOKS_LIKE[quantity], bare):
+        if re.search(_LOOKS_LIKE[quantity], bare) and not (quantity is VELOCITY and "rpm" in header.lower()):
             return quantity
     return VOLTAGE if re.search(CONTROLS[control], bare) else None
 
@@ -514,6 +514,8 @@ class Dialect:
     apart: bool = False
     """Whether the config names the headers, since no line holds them as they are: blanks separate the rows and stand
     within the headers too, or further lines stand below them."""
+    without_fields: tuple[str, ...] = ()
+    """Last names of the header, of which no row has a field; they are none of `header`."""
     headless: bool = False
     """Whether the file has no headers; those here are made up."""
 
@@ -532,7 +534,7 @@ class Dialect:
         split : how it is cut into tests
         """
         options: dict[str, Any] = {"skip": self.skip, "units_row": self.units_row, "decimal": self.decimal}
-        if self.headless or self.apart:
+        if self.headless or self.apart or self.without_fields:
             options["header"] = self.header
         if form == TEXT:
             options |= {"separator": self.separator, "encoding": self.encoding}
@@ -712,7 +714,8 @@ def _table(
         )
     )
     top = first - 1 - units
-    rows[top] = _with_fields(rows[top], width if separator != BLANKS and not units else len(rows[top]))
+    named_more = [] if separator == BLANKS or units else _without_fields(rows[top], width)
+    rows[top] = rows[top][: len(rows[top]) - len(named_more)]
     if len(rows[top]) != width:
         return None
     if separator == BLANKS and any(head.endswith((",", ";")) for head in rows[top]):
@@ -722,15 +725,16 @@ def _table(
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
     named = tuple(rows[first - 1]) if units else None
     found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
+    found = replace(found, skip=start, without_fields=tuple(named_more)) if named_more else found
     if not assigned(found.header, named, control_of(found.header, named)):
         names = _names_further_up(rows, first, width)
         found = replace(found, header=names, units=None, skip=start, units_row=False, apart=True) if names else found
     return (len(alike), sum(numbers[n] for n in alike)), found
 
 
-def _with_fields(names: list[str], width: int) -> list[str]:
-    """Return names without the last ones, which have no field in any row; not where one may hold the separator."""
-    return names if any(map(is_unit, names[1:])) else names[: max(width, 1)]
+def _without_fields(names: list[str], width: int) -> list[str]:
+    """Return the last names of a header that is longer than the rows; none where one may hold the separator."""
+    return [] if any(map(is_unit, names[1:])) else names[max(width, 1) :]
 
 
 _FEWEST_NAMED = 2  # channels of a rig in a line of names; one may be named by chance

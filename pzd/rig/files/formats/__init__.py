@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # the child has no use for it, and its import takes long
 
 TEXT = "text"
 """Format of files that no other format recognises by their content or their ending."""
-ALL_OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding", "table")
+ALL_OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "leave_out", "encoding", "table")
 """Keys of an entry about the dialect of a file."""
 START = 4096
 """Bytes from the start of a file by which its format is known."""

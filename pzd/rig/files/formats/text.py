@@ -43,7 +43,6 @@ from pzd.rig.files.sheet import (
     told_below,
     words_below,
 )
-from pzd.rig.files.units import is_unit
 from pzd.schema.errors import DataError, at, counted
 
 if TYPE_CHECKING:
@@ -85,6 +84,8 @@ class _Lines:
     fields: NDArray[np.int64]
     """(rows,) number of fields of every data row."""
     separator: str
+    left_out: tuple[int, ...] = ()
+    """Lines that `leave_out` of the entry leaves out."""
 
 
 def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
@@ -115,7 +116,6 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
     lines, below = _without_words_below(lines)
     body, numbers = lines.body, lines.numbers
-    header, without_fields = _without_empty_columns(path, lines, entry, header, wanted, header_line)
     uneven = lines.fields != len(header)
     trailing = 0
     if entry.split is not None and entry.split.event == header[-1]:
@@ -125,7 +125,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     if uneven.any():
         if entry.header is None:
             _refuse_repeated_header(path, numbers, header, _headers_among(body, lines.separator, header))
-        raise DataError(_uneven_faults(path, lines, np.flatnonzero(uneven), len(header)))
+        raise DataError(_uneven_faults(path, lines, np.flatnonzero(uneven), header, header_line))
     units = tuple(heads[-1]) if entry.units_row else None
     if units is not None and len(units) != len(header):
         raise DataError(f"{at(path, int(numbers[0]) - 1)}: {len(units)} units for {len(header)} columns")
@@ -139,7 +139,7 @@ def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
     sparse = {i: cells for i in faults if header[i] in wanted.held and (cells := table.sparse(i)) is not None}
     values, faults = values | sparse, {i: told for i, told in faults.items() if i not in sparse}
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    steps = (*_steps(entry, header, wanted, numbers, trailing), *without_fields, *below)
+    steps = (*_steps(entry, header, wanted, lines, trailing), *below)
     return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
 
 
@@ -185,6 +185,7 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     heads: list[list[str]] = []
     numbers, fields = array("q"), array("q")  # a list of as many numbers takes five times the memory
     is_left_out = re.compile(entry.leave_out).search if entry.leave_out is not None else None
+    left_out = list[int]()
     blocks: list[str] = []
     block: list[str] = []
     first_rows: list[str] = []
@@ -196,6 +197,7 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
         if not line.strip() and (not numbers or entry.rate_Hz is None):
             continue
         if is_left_out is not None and is_left_out(line):
+            left_out.append(number)
             continue
         if len(numbers) < _ROWS_READ:
             first_rows.append(line)
@@ -208,7 +210,9 @@ def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
     if heads and fields and fields[0] == len(heads[0]) + 1 and are_numbered(first_rows):
         heads = [[ROW_NAMES, *head] for head in heads]
     body = "\n".join([*blocks, "\n".join(block)] if block else blocks)
-    return _Lines(heads, body, np.array(numbers, dtype=np.int64), np.array(fields, dtype=np.int64), _UNQUOTED)
+    return _Lines(
+        heads, body, np.array(numbers, dtype=np.int64), np.array(fields, dtype=np.int64), _UNQUOTED, tuple(left_out)
+    )
 
 
 def _numbered_lines(entry: FilesEntry, text: str) -> Iterator[tuple[int, str]]:
@@ -278,31 +282,6 @@ def _without_words_below(lines: _Lines) -> tuple[_Lines, list[ReadingStep]]:
     return replace(lines, body=kept, numbers=lines.numbers[:last], fields=lines.fields[:last]), [told_below(count)]
 
 
-def _without_empty_columns(
-    path: Path, lines: _Lines, entry: FilesEntry, header: list[str], wanted: Wanted, header_line: int | None
-) -> tuple[list[str], list[ReadingStep]]:
-    """Leave out the last columns of a header that have no field in any row, as a logger writes them without a sensor.
-
-    Not where a name may hold the separator, as `Force, N` does without quotes: the columns would be read as others.
-
-    Raises
-    ------
-    DataError : when one of them is wanted
-    """
-    count = int(np.argmax(np.bincount(lines.fields)))  # that of nearly all rows; the others are told
-    missing = header[count:]
-    split_names = any(map(is_unit, header[1:]))
-    event = entry.split is not None and entry.split.event in header
-    if entry.header is not None or entry.units_row or not missing or count < 2 or split_names or event:
-        return header, []
-    if np.count_nonzero(lines.fields != count) > MOST_FAULTS or np.any(lines.fields == len(header)):
-        return header, []  # some rows have them, as a label or an event at its beginning
-    if lacking := [name for name in missing if name in wanted.known]:
-        place = at(path, header_line)
-        raise DataError([f"{place}: {name}: no row of the file has a field under this header" for name in lacking])
-    return header[:count], [ReadingStep("left out", None, f"columns {', '.join(missing)}, which no row has", "")]
-
-
 def _without_trailing_separators(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_], int]:
     """Take away a separator behind the last field of a row, which some loggers write on all rows or on some.
 
@@ -355,8 +334,18 @@ def _refuse_repeated_header(
         )
 
 
-def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: int) -> list[str]:
+def _uneven_faults(
+    path: Path, lines: _Lines, rows: NDArray[np.int64], header: Sequence[str], header_line: int | None
+) -> list[str]:
     """Describe rows with more or fewer fields than the header."""
+    width, usual = len(header), int(np.argmax(np.bincount(lines.fields)))
+    alike = np.count_nonzero(lines.fields == usual) > lines.fields.size - MOST_FAULTS
+    if header_line is not None and 1 < usual < width and alike:
+        # Which names have no field nobody can tell: a name may hold the separator, as `Force, N` does.
+        kept = f"skip: {header_line} and header: [{', '.join(header[:usual])}]"
+        last = ", ".join(filter(None, header[usual:])) or "empty"
+        told = f"the header has {width} names, and the rows have {usual} fields"
+        return [f"{at(path, header_line)}: {told}; where the last names have none ({last}), say {kept}"]
     separator = "" if lines.separator == _UNQUOTED else f" (separator {lines.separator!r})"
     said = _how_to_leave_out(lines, rows)
     shown = [
@@ -370,6 +359,10 @@ def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: in
     return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{advice}"]
 
 
+_LEFT_OUT = "this is no sample, say leave_out:"
+"""What to do about a line with a word among the samples, followed by the words."""
+
+
 def _how_to_leave_out(lines: _Lines, rows: NDArray[np.int64]) -> str:
     """Say which key leaves uneven rows out, where they are few among others and hold a word, as messages do."""
     if message := _messages_begin(lines, rows):
@@ -379,14 +372,10 @@ def _how_to_leave_out(lines: _Lines, rows: NDArray[np.int64]) -> str:
     every = lines.body.split("\n")
     cells = [[cell.strip() for cell in every[row].split(lines.separator)] for row in rows.tolist()]
     words = {next((cell for cell in of_row if _WORD.search(cell)), "") for of_row in cells}
-    return "" if "" in words else f"; if {LEFT_OUT} {found_in(words)}"
+    return "" if "" in words else f"; if {_LEFT_OUT} {_found_in(words)}"
 
 
-LEFT_OUT = "this is no sample, say leave_out:"
-"""What to do about a line with a word among the samples, followed by the words."""
-
-
-def found_in(words: Collection[str]) -> str:
+def _found_in(words: Collection[str]) -> str:
     """Return the regular expression that finds any of some words, as YAML has it."""
     pattern = "|".join(re.sub(r"\\ ", " ", re.escape(word)) for word in sorted(words))
     return "'" + pattern.replace("'", "''") + "'"
@@ -405,18 +394,21 @@ def _messages_begin(lines: _Lines, rows: NDArray[np.int64]) -> str | None:
     return (f"'{begin}'" if not begin.isalpha() else begin) if others == rows.size else None
 
 
-def _steps(
-    entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64], trailing: int
-) -> Iterator[ReadingStep]:
+def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, taken: _Lines, trailing: int) -> Iterator[ReadingStep]:
     """Report what is read of a file, and the lines and columns that are left out."""
+    lines = taken.numbers
     if trailing:
         yield ReadingStep("left out", None, f"{counted(trailing, 'separator')} behind the last field of a row", "")
     if entry.skip:
         yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
-    dropped = int(lines[-1] - lines[0]) + 1 - lines.size
+    if taken.left_out:
+        yield ReadingStep(
+            "left out", None, f"{counted(len(taken.left_out), 'line')} in which {entry.leave_out!r} is found", ""
+        )
+    between = sum(int(lines[0]) < number < int(lines[-1]) for number in taken.left_out)
+    dropped = int(lines[-1] - lines[0]) + 1 - lines.size - between
     if dropped:
         kind = "that are empty" if entry.comment is None else f"that begin with {entry.comment!r}"
-        kind = kind if entry.leave_out is None else f"in which {entry.leave_out!r} is found"
         yield ReadingStep("left out", None, f"{counted(dropped, 'line')} {kind}", "")
     yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
@@ -523,7 +515,7 @@ class _Table:
             if bad:
                 advice = _advice(grouped=grouped, commas=commas, words=words)
                 if words and bad <= min(MOST_FAULTS, self.lines.size // 2) and all(_WORD.search(c) for _, c in first):
-                    advice += f"; if {LEFT_OUT} {found_in({cell for _, cell in first})}"
+                    advice += f"; if {_LEFT_OUT} {_found_in({cell for _, cell in first})}"
                 if bad == 1 and first[0][0] == 0 and _UNIT_CELL.fullmatch(first[0][1]):
                     advice = "; if this row holds the units, say units_row: true"
                 wrong = [(row, f"a number is needed (got {cell!r}){advice}") for row, cell in first]
