@@ -475,17 +475,19 @@ def force_changes(forces: Sequence[KneeForceRow], control: Control) -> tuple[tup
     units: list[UnitRow] = []
     for axis, rows in _axes(forces, control).items():
         for low, before, high, after in _neighbours(rows):
-            # Magnitudes without the gas force, which has a sign: below zero where it pushes the rod out.
-            rebound = [row.rebound_force_N - row.gas_force_N for row in (before, after)]
-            compression = [row.gas_force_N - row.compression_force_N for row in (before, after)]
+            # Magnitudes without the gas force, which has a sign: below zero where it pushes the rod out. Where either
+            # position does not tell it, it is in both.
+            told = before.gas_force_N != 0.0 and after.gas_force_N != 0.0
+            gas_forces = [row.gas_force_N if told else 0.0 for row in (before, after)]
+            rebound = [row.rebound_force_N - gas for row, gas in zip((before, after), gas_forces, strict=True)]
+            compression = [gas - row.compression_force_N for row, gas in zip((before, after), gas_forces, strict=True)]
             labels = label_columns((axis.setting, axis.voltage, before.temperature_degC))
             labels["velocity_m_per_s"] = before.velocity_m_per_s
             changes = [(rebound[1] - rebound[0]) / (high - low), (compression[1] - compression[0]) / (high - low)]
             if axis.unit:
                 cells = {"unit": axis.unit, "from_value": low, "to_value": high}
                 cells |= {"rebound_N_per_unit": changes[0], "compression_N_per_unit": changes[1]}
-                told = before.gas_force_N != 0.0 and after.gas_force_N != 0.0
-                gas = (after.gas_force_N - before.gas_force_N) / (high - low) if told else None
+                gas = (gas_forces[1] - gas_forces[0]) / (high - low) if told else None
                 units.append(UnitRow.model_validate({**labels, **cells, "gas_force_N_per_unit": gas}))
             else:
                 cells = {"from_click": low, "to_click": high}

@@ -37,6 +37,7 @@ from pzd.identification.stage import identify
 from pzd.parallel.processes import no_listener
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.report.tables import knee as knee_tables
 from pzd.rig.config import FilesEntry, RigConfig
 from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.nuisance import NuisanceConfig
@@ -585,6 +586,28 @@ def test_a_gas_pressure_has_a_force_per_unit_with_the_change_of_the_gas_force(un
     assert row.compression_N_per_unit == pytest.approx(0.1)
     assert row.gas_force_N_per_unit == pytest.approx(-1.5)
     assert clicks == ()
+
+
+@pytest.mark.parametrize("gas", [(0.0, 0.0), (0.0, -180.0)])
+def test_a_gas_force_that_a_pressure_does_not_tell_changes_by_nothing_that_is_known(gas: tuple[float, float]) -> None:
+    """It was 0 N/psi, or all of the other's, and what the gas did stood in neither direction."""
+    low, high = (force_row(f"{p} psi", None, 300.0 + 0.2 * p, gas=g) for p, g in zip((50, 150), gas, strict=True))
+    _, (row,) = force_changes([low, high], Control())
+    assert row.gas_force_N_per_unit is None
+    assert row.rebound_N_per_unit == pytest.approx((high.rebound_force_N - low.rebound_force_N) / 100.0)
+    assert row.compression_N_per_unit == pytest.approx((low.compression_force_N - high.compression_force_N) / 100.0)
+
+
+def test_a_number_that_no_test_shows_is_not_told_with_its_interval() -> None:
+    ends = {"rebound_bleed_Ns_per_m_low95": 0.0, "rebound_bleed_Ns_per_m_high95": 1e8}
+    row = knee_row().model_copy(update={**ends, "reached_m_per_s": 0.2, "W_s": 0.01, "rmse_N": 20.0})
+    rebound, compression = Knees((row,)).directions()
+    assert not rebound.shows("bleed_Ns_per_m")
+    assert compression.shows("bleed_Ns_per_m")
+    (table,) = (each for each in knee_tables(Knees((row,)), Control()) if each.title.startswith("Bleed, knee"))
+    told = "\n".join(table.lines())
+    assert "not shown" in told
+    assert "1e+08" not in told
 
 
 def test_a_gas_pressure_may_be_the_control_signal() -> None:
