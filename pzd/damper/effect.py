@@ -70,9 +70,6 @@ LARGEST_DAMPING = 1.0e9
 """Of any damper [N s/m]: a tenth of that force, as of the largest ones, at 10 mm/s."""
 LARGEST_SQUARE = 1.0e12
 """Force over the square of the speed of any damper [N s2/m2]: the largest force at 10 mm/s."""
-STIFFEST_BESIDE = 1.0e11
-"""Of any spring beside the element [N/m]: the largest force after 1 mm."""
-
 FLOWING_WELL = (0.1, 0.9)
 """Shares of the way from T0 to the largest force of a condition between which a change of the flow shows well.
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import LARGEST_FORCE, Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="guide_friction",
     place="parallel",
     law="F_g sign(v)",
-    parameters=(Parameter("F_g", "N", 0.0, 0.0, LARGEST_FORCE, "friction", Search(lambda s: s.force, (0.02,))),),
+    parameters=(Parameter("F_g", "N", 0.0, 0.0, 1.0e6, "friction", Search(lambda s: s.force, (0.02,))),),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)",
     tests=(
         ({"x": 0.0, "v": 0.02, "a": 0.0, "F_g": 20.0}, 20.0),

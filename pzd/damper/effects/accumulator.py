@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_FORCE, Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 POLYTROPIC = 1.3
 """Exponent: 1 for isothermal gas, 1.4 for adiabatic nitrogen, which is approached above 1 Hz."""
@@ -38,9 +38,7 @@ EFFECT = Effect(
     place="parallel",
     law="-F_g (1 + x/L)^-1.3",
     parameters=(
-        Parameter(
-            "F_g", "N", 0.0, 0.0, LARGEST_FORCE, "static force of the gas on the rod", Search(lambda s: s.force, (0.1,))
-        ),
+        Parameter("F_g", "N", 0.0, 0.0, 1.0e6, "static force of the gas on the rod", Search(lambda s: s.force, (0.1,))),
         Parameter(
             "L",
             "m",

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_FORCE, Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 EXPONENT = 2
 """n of the source: 1 is the friction of Dahl; larger ones approach `second_branch`."""
@@ -36,9 +36,7 @@ EFFECT = Effect(
     place="branch",
     law="dF/dx = F_h/x_h (1 - z^2) winding up, F_h/x_h (1 + (2 sigma - 1) z^2) unwinding, z = F/F_h",
     parameters=(
-        Parameter(
-            "F_h", "N", 0.0, 0.0, LARGEST_FORCE, "ultimate force of the hysteresis", _F_H_SEARCH, with_friction=True
-        ),
+        Parameter("F_h", "N", 0.0, 0.0, 1.0e6, "ultimate force of the hysteresis", _F_H_SEARCH, with_friction=True),
         Parameter("x_h", "m", 1.0e-3, 1.0e-6, 1.0, "travel over which it would come up without a bend", _X_H_SEARCH),
         Parameter(
             "sigma",

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.effect import STIFFEST_BESIDE, Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -27,7 +27,7 @@ EFFECT = Effect(
     place="parallel",
     law="k_e (|x| - x_e)^2 sign(x) beyond x_e",
     parameters=(
-        Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e3 * STIFFEST_BESIDE, "progressive stiffness of the stop", _K_E_SEARCH),
+        Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop", _K_E_SEARCH),
         Parameter(
             "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", _X_E_SEARCH, position="to either side of"
         ),

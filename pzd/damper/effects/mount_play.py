@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_FORCE, Beside, Effect, EffectValues, Parameter, Search
+from pzd.damper.effect import Beside, Effect, EffectValues, Parameter, Search
 from pzd.damper.effects.cavitation import soft_play
 
 SPREAD = 0.02
@@ -52,8 +52,8 @@ EFFECT = Effect(
             "F_m",
             "N",
             0.0,
-            -LARGEST_FORCE,
-            LARGEST_FORCE,
+            -1.0e6,
+            1.0e6,
             "force of the flow at which the joint bears nothing",
             Search(lambda s: s.force, (0.1, -0.1), within=(-0.9, 0.9)),
         ),

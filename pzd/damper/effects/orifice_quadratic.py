@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import LARGEST_SQUARE, Effect, Parameter, Search, growing
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 _SEARCH = Search(lambda s: s.force / s.speed**2, (0.05,))
 
@@ -15,9 +15,7 @@ EFFECT = Effect(
     name="orifice_quadratic",
     place="flow",
     law="+ q w^2",
-    parameters=(
-        Parameter("q", "N s2/m2", 0.0, 0.0, LARGEST_SQUARE, "force over the square of the flow speed", _SEARCH),
-    ),
+    parameters=(Parameter("q", "N s2/m2", 0.0, 0.0, 1.0e8, "force over the square of the flow speed", _SEARCH),),
     source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, Hydraulic Control Systems",
     tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
     hidden=growing("q", lambda s: s.force / s.speed**2),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_FORCE, Beside, Effect, EffectValues, Parameter, Search, growing
+from pzd.damper.effect import Beside, Effect, EffectValues, Parameter, Search, growing
 from pzd.damper.effects.accumulator import EXPONENTS, other_gas
 
 LIKE_FRICTION = 0.3
@@ -43,13 +43,7 @@ EFFECT = Effect(
     law="F_0",
     parameters=(
         Parameter(
-            "F_0",
-            "N",
-            0.0,
-            -LARGEST_FORCE,
-            LARGEST_FORCE,
-            "constant force beside the element",
-            Search(lambda s: s.force, (0.0,)),
+            "F_0", "N", 0.0, -1.0e6, 1.0e6, "constant force beside the element", Search(lambda s: s.force, (0.0,))
         ),
     ),
     source="Dixon 2007, The Shock Absorber Handbook",

@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_DAMPING, LARGEST_FORCE, Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -34,15 +34,9 @@ EFFECT = Effect(
     place="flow",
     law="beyond b = max(F_r, T0) the slope is C_r",
     parameters=(
-        Parameter("F_r", "N", inf, 0.0, LARGEST_FORCE, "force at which the valve opens", _F_R_SEARCH),
+        Parameter("F_r", "N", inf, 0.0, 1.0e7, "force at which the valve opens", _F_R_SEARCH),
         Parameter(
-            "C_r",
-            "N s/m",
-            0.0,
-            1.0e-3,
-            LARGEST_DAMPING,
-            "slope beyond it",
-            Search(lambda s: s.damping, (0.4,), logarithmic=True),
+            "C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it", Search(lambda s: s.damping, (0.4,), logarithmic=True)
         ),
     ),
     natural=_flatter,

@@ -10,7 +10,7 @@ rounded yield. A larger or smaller k bends the whole way to T0, not its second p
 
 from __future__ import annotations
 
-from pzd.damper.effect import LARGEST_FORCE, STIFFEST_BESIDE, Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search
 
 _T0_2_SEARCH = Search(lambda s: s.force, (0.05, 0.2))
 _K_2_SEARCH = Search(lambda s: s.force / s.stroke, (1.0, 5.0, 20.0), logarithmic=True)
@@ -20,18 +20,9 @@ EFFECT = Effect(
     place="branch",
     law="dF_2/dt = k_2 dx/dt, |F_2| <= T0_2",
     parameters=(
+        Parameter("T0_2", "N", 0.0, 0.0, 1.0e6, "force at which the branch slips", _T0_2_SEARCH, with_friction=True),
         Parameter(
-            "T0_2", "N", 0.0, 0.0, LARGEST_FORCE, "force at which the branch slips", _T0_2_SEARCH, with_friction=True
-        ),
-        Parameter(
-            "k_2",
-            "N/m",
-            1.0e5,
-            1.0,
-            STIFFEST_BESIDE,
-            "stiffness of the branch before it slips",
-            _K_2_SEARCH,
-            with_friction=True,
+            "k_2", "N/m", 1.0e5, 1.0, 1.0e9, "stiffness of the branch before it slips", _K_2_SEARCH, with_friction=True
         ),
     ),
     source="Iwan 1966, J. Appl. Mech. 33(4); generalized Maxwell slip: Al-Bender, Lampaert and Swevers 2005, "

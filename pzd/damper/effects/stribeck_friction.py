@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.effect import LARGEST_FORCE, Effect, Parameter, Scales, Search, Strength
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -25,13 +25,7 @@ EFFECT = Effect(
     law="F_s exp(-(v/v_s)^2) sign(v)",
     parameters=(
         Parameter(
-            "F_s",
-            "N",
-            0.0,
-            0.0,
-            LARGEST_FORCE,
-            "friction at rest above that at speed",
-            Search(lambda s: s.force, (0.02,)),
+            "F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed", Search(lambda s: s.force, (0.02,))
         ),
         Parameter("v_s", "m/s", 0.02, 1.0e-4, 2.0, "speed over which it falls", _V_S_SEARCH),
     ),

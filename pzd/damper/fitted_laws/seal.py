@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import tanh
 
-from pzd.damper.effect import LARGEST_FORCE, Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search
 
 _V_S_SEARCH = Search(lambda s: s.speed, (0.003,), logarithmic=True, within=(0.0, 0.05))
 """Of the fastest test: what has not turned at a twentieth of that is damping, and no friction."""
@@ -18,7 +18,7 @@ EFFECT = Effect(
     place="parallel",
     law="F_s tanh(v/v_s)",
     parameters=(
-        Parameter("F_s", "N", 0.0, 0.0, LARGEST_FORCE, "friction on the rod", Search(lambda s: s.force, (0.02,))),
+        Parameter("F_s", "N", 0.0, 0.0, 1.0e6, "friction on the rod", Search(lambda s: s.force, (0.02,))),
         Parameter("v_s", "m/s", 1.0e-3, 1.0e-5, 1.0, "speed by which it has turned", _V_S_SEARCH),
     ),
     source="regularised Coulomb friction; Andersson, Soderberg and Bjorklund 2007, Tribology International 40(4)",
