@@ -339,8 +339,8 @@ def _uneven_faults(
 ) -> list[str]:
     """Describe rows with more or fewer fields than the header."""
     width, usual = len(header), int(np.argmax(np.bincount(lines.fields)))
-    alike = np.count_nonzero(lines.fields == usual) > lines.fields.size - MOST_FAULTS
-    if header_line is not None and 1 < usual < width and alike:
+    alike = np.count_nonzero(lines.fields[rows] == usual) > lines.fields.size - MOST_FAULTS
+    if header_line is not None and 1 < usual < width and alike and not np.any(lines.fields == width):
         # Which names have no field nobody can tell: a name may hold the separator, as `Force, N` does.
         kept = f"skip: {header_line} and header: [{', '.join(header[:usual])}]"
         last = ", ".join(filter(None, header[usual:])) or "empty"
