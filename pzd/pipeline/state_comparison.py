@@ -107,8 +107,9 @@ def compare_states(before: Named, after: Named, jobs: int, say: Say) -> Compared
         setting if one.run.config == other.run.config and setting is not None else given.run.config.stem
         for given, setting in zip((one, other), settings, strict=True)
     ]
-    with other.placed():
+    with one.placed():
         first = _first_state(one, names[0], settings[0], jobs, say)
+    with other.placed():
         second = _state(other, names[1], settings[1], jobs)
         say(f"changes    runs: {names[0]} and {names[1]} are compared")
         config = other.config

@@ -61,10 +61,11 @@ TOLERANCE = 1e-6
 """Tolerance of the simulations, as a share of the force: far below what counts."""
 SHARE = "share"
 """Coordinate of a known temperature: 0 at that of the first state, 1 at that recorded in the second."""
-FAR = 0.5
+FAR = 1.0
 """Share of the half stroke by which the middle of a stop at one side lies off.
 
-Reason: one that begins at 0.3 of the half stroke, where the first do, has its other end at 1.3."""
+Reason: one that begins at 0.3 of the half stroke, where the first do, has its other end at 2.3, beyond what the second
+state is run to; the gas is compressed at 1.5 at most, and would have no length left."""
 LEAST_WARMING = 0.5
 """Difference of the mean temperatures [K] from which temperature is a candidate: the resolution of a thermocouple."""
 
@@ -192,8 +193,8 @@ class FirstState:
     @property
     def may_be_moved(self) -> bool:
         """Whether the damper is the same about any zero of the displacement."""
-        beyond = self.middle_m + FAR * self.scales.stroke
-        return _counted_from(self.damper, beyond).zero_m == beyond
+        beyond = [self.middle_m + side * FAR * self.scales.stroke for side in (1, -1)]
+        return all(_counted_from(self.damper, zero).zero_m == zero for zero in beyond)
 
     def _placed(self, damper: Damper, placed: Sequence[tuple[Coordinate, float]]) -> Damper:
         """Return a damper with effects that act at a place of the stroke, about its middle.

@@ -530,7 +530,8 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield f"header: [{', '.join(map(written, dialect.header))}]    # {why}"
     if dialect.without_fields:
         missing = ", ".join(filter(None, dialect.without_fields)) or "an empty name"
-        yield f"header: [{', '.join(map(written, dialect.header))}]    # without {missing}: no row has so many fields"
+        why = f"without {missing}, for no row has so many fields; check that no name holds the separator"
+        yield f"header: [{', '.join(map(written, dialect.header))}]    # {why}"
     if dialect.headless:
         yield f"header: [{', '.join(dialect.header)}]    # the file has none: these names are made up"
     if dialect.decimal == ",":
