@@ -38,7 +38,8 @@ def changes_lines(found: Changes, control: Control) -> Iterator[str]:
             yield f"{title}:"
         for row in rows:
             yield from (f"  {line}" for line in _lines(row, control, newly=had_no_value(row, rows)))
-        if title == "changed" and sum(change.share for change in found.changes) > _WHOLE:
+        shares = {change.name: change.share for change in found.changes}  # the numbers of one effect have one share
+        if title == "changed" and sum(shares.values()) > _WHOLE:
             yield f"  shares: {SHARES}; so they come to more than 100 % together"
     if found.next_test:
         yield next_test_line(found.next_test, control.unit)
