@@ -117,7 +117,7 @@ def test_where_a_stop_begins_has_no_first_value_where_there_was_no_stop(stiffnes
     assert cells(page_of(compared), "end stop x_e")[0] == ("0.02 N" if stiffness else "-")
     assert not any(
         "more than 100 %" in each for each in changes_lines(compared.changes, VOLTS)
-    )  # one share, told twice
+    )  # told twice
 
 
 @pytest.mark.parametrize(
