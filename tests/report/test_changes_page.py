@@ -115,9 +115,7 @@ def test_where_a_stop_begins_has_no_first_value_where_there_was_no_stop(stiffnes
     assert ("0.02 N -> 0.025" in line) == (stiffness > 0.0)
     assert ("by +25 %" in line) == (stiffness > 0.0)
     assert cells(page_of(compared), "end stop x_e")[0] == ("0.02 N" if stiffness else "-")
-    assert not any(
-        "more than 100 %" in each for each in changes_lines(compared.changes, VOLTS)
-    )  # told twice
+    assert not any("more than 100 %" in each for each in changes_lines(compared.changes, VOLTS))  # told twice
 
 
 @pytest.mark.parametrize(
