@@ -127,15 +127,16 @@ CONSTANT_FORCES = {("preload_offset", "F_0"): 1.0, ("accumulator", "F_g"): -1.0}
 
 
 def _of_seal_or_valve(value: Value, damper: Damper, sign: float) -> Value:
-    """Return a constant force with an interval that holds it also where the friction is no asymmetric one.
+    """Return a constant force with an interval that holds it also where the friction is the other kind.
 
     A friction T0 (1 + alpha sign F) has a mean of alpha T0, which one the same both ways, as of a seal, leaves to the
     constant force: at one T0 no test tells them apart.
     """
-    alpha = damper.effects.get("asymmetry", {}).get("alpha", 0.0)
-    if not isinstance(alpha, float):
+    uneven = damper.effects.get("asymmetry", {}).get("alpha", 0.0)
+    even = damper.effects.get("viscous_asymmetry", {}).get("alpha_C", 0.0)
+    if not (isinstance(uneven, float) and isinstance(even, float)):
         return value
-    return _widened(value, (0.0, sign * alpha * min(row.T0_N for row in damper.base)))
+    return _widened(value, (0.0, sign * (uneven - even) * min(row.T0_N for row in damper.base)))
 
 
 def _value(

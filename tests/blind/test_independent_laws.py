@@ -35,6 +35,7 @@ IN_KERNEL: dict[str, dict[str, float]] = {
     "accumulator": {"F_g": 80.0, "L": 0.05},
     "cavitation": {"d_c": -1.5e-3, "F_c": 100.0},
     "frame_compliance": {"d_f": 1e-3, "F_f": 100.0},
+    "viscous_asymmetry": {"alpha_C": 0.2},
     "bouc_wen": {"F_h": 60.0, "x_h": 2e-3, "sigma": 1.5},
 }
 FORMS: dict[str, dict[str, float]] = {

@@ -47,6 +47,7 @@ PRESENT = {
     "relief_valve": {"F_r": 900.0, "C_r": 400.0},
     "rounded_yield": {"w_s": 0.02},
     "asymmetry": {"alpha": 0.1},
+    "viscous_asymmetry": {"alpha_C": 0.2},
     "gas_spring": {"k_g": 3000.0},
     "preload_offset": {"F_0": 60.0},
     "fluid_inertia": {"m": 20.0},

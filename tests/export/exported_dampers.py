@@ -63,6 +63,7 @@ BESIDE = {
 }
 IN_THE_FLOW = {
     "asymmetry": {"alpha": -0.3},
+    "viscous_asymmetry": {"alpha_C": 0.25},
     "orifice_quadratic": {"q": (1500.0, 4000.0), "at_voltage_V": (0.0, 120.0)},
     "relief_valve": {"F_r": 900.0, "C_r": 800.0},
 }

@@ -42,6 +42,7 @@ class Parameters(NamedTuple):
     """Every parameter of the laws; each default leaves its law out."""
 
     alpha: float = 0.0
+    alpha_C: float = 0.0
     q: float = 0.0
     w_s: float = 0.0
     n: float = 1.0
@@ -167,7 +168,7 @@ def _closed_flow(force: float, T0: float, C: float, p: Parameters) -> float:
 def _flow(force: float, T0: float, C: float, p: Parameters) -> float:
     """Return the flow speed [m/s], with its sign, that a force drives through the valves."""
     factor = laws.direction_factor(force > 0.0, p.alpha)
-    size, friction, damping = abs(force), T0 * factor, C * factor
+    size, friction, damping = abs(force), T0 * factor, C * factor * laws.shim_factor(force > 0.0, p.alpha_C)
     opens = laws.relief_opening(p.F_r, friction)
     if size > opens:
         w = _closed_flow(opens, friction, damping, p) + laws.relief_flow(size - opens, p.C_r)

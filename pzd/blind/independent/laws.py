@@ -232,6 +232,20 @@ ASYMMETRY = Law("asymmetry", lambda rng, scale, strength: {"alpha": either_side(
 
 
 @compiled
+def shim_factor(rebound: bool, alpha_C: float) -> float:
+    """Return the factor on C alone where shims differ between the two directions of flow.
+
+    Equation: 1 + alpha_C sign(F)
+    """
+    return 1.0 + alpha_C if rebound else 1.0 - alpha_C
+
+
+VISCOUS_ASYMMETRY = Law(
+    "viscous_asymmetry", lambda rng, scale, strength: {"alpha_C": either_side(rng) * min(0.7, strength)}
+)
+
+
+@compiled
 def orifice_force(flow: float, q: float) -> float:
     """Return the force [N] of turbulent flow through a sharp orifice at a flow speed >= 0 [m/s].
 
@@ -415,6 +429,6 @@ SENSOR_DELAY = Law("sensor_delay", _draw_sensor_delay, "sensor")
 LAWS = by_name(
     *(ASYMMETRY, END_STOP, FLUID_INERTIA, GAS_SPRING, LASH, ORIFICE_QUADRATIC, PIEZO_HYSTERESIS, PRELOAD_OFFSET),
     *(RELIEF_VALVE, ROUNDED_YIELD, SENSOR_DELAY, SHEAR_THINNING, STRIBECK_FRICTION, TEMPERATURE_DRIFT, VALVE_LAG),
-    *(ACCUMULATOR, CAVITATION, FRAME_COMPLIANCE),
+    *(ACCUMULATOR, CAVITATION, FRAME_COMPLIANCE, VISCOUS_ASYMMETRY),
 )
 """Every law that a verdict names."""

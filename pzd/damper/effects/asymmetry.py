@@ -1,7 +1,8 @@
 """Difference of rebound and compression: other ports or shims for the two directions.
 
 Law: T0 and C times (1 + alpha sign(F)), and the force of a branch beside them likewise by its own sign. Range:
-passenger cars damp rebound two to three times as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent.
+passenger cars damp rebound two to three times as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent. Where
+the friction is alike both ways, as that of a seal, it is a `viscous_asymmetry`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 Law: F_0. Range: gas-charged dampers 50-300 N. Friction that differs between the two directions, T0 (1 + alpha sign(F)),
 is the constant alpha T0 as long as the rod slips. Neither gas nor zero knows the control signal, so an offset that goes
-with it may be an `asymmetry` of the friction alone; one of -alpha T0 beside an `asymmetry` makes it one of C alone.
+with it may be an `asymmetry` of the friction alone; one of -alpha T0 beside an `asymmetry` makes it a
+`viscous_asymmetry`.
 Beside an `accumulator`, whose law has one exponent, a gas of another leaves a constant: 13 % of F_g at most.
 """
 
@@ -22,8 +23,8 @@ Reason: 0 to 15 % where damping alone differed between the directions (four rigs
 def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
     """Return what else an offset may be by its value and what stands beside it; None for an offset.
 
-    `asymmetry` where it goes with the control signal, or undoes the asymmetry of the friction; `accumulator` where it
-    is what a gas of another exponent than that of its law leaves.
+    `asymmetry` where it goes with the control signal, `viscous_asymmetry` where it undoes that of the friction;
+    `accumulator` where it is what a gas of another exponent than that of its law leaves.
     """
     if isinstance(values["F_0"], tuple):
         return "asymmetry"
@@ -34,7 +35,7 @@ def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
     alpha = beside.effects.get("asymmetry", {}).get("alpha", 0.0)
     undone = -np.mean(alpha) * np.array(beside.T0)
     near = np.abs(values["F_0"] - undone) < LIKE_FRICTION * np.abs(undone)
-    return "asymmetry" if np.all(near) else None
+    return "viscous_asymmetry" if np.all(near) else None
 
 
 EFFECT = Effect(

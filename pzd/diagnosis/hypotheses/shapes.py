@@ -257,7 +257,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("1", "N", "a constant force, as a gas charge gives", _DIXON,
            lambda s: np.ones(s.x.size), "1.0", library=("preload_offset",)),
     _shape("|v|", "N s/m", "damping that differs between rebound and compression", _DIXON,
-           lambda s: np.abs(s.v), "abs(v)", library=("asymmetry",)),
+           lambda s: np.abs(s.v), "abs(v)", library=("asymmetry", "viscous_asymmetry")),
     _shape("v^2", "N s2/m2", "an orifice that differs between rebound and compression", _DIXON,
            lambda s: s.v**2, "v * v", library=("asymmetry",)),
     _shape("|v| v", "N s2/m2", "an orifice", "Merritt 1967, Hydraulic Control Systems", lambda s: np.abs(s.v) * s.v,
