@@ -172,7 +172,8 @@ def rated(
     sick = None
     if vertical and position in ("seat", "standing"):
         sick = motion_sickness_dose(weighted_record(np.ascontiguousarray(vertical[0]), rate, WF), rate)
-    return Rating(position, tuple(found), rate, duration, hours, sick, tuple(_notes(rate, duration, sick is not None)))
+    notes = [*_notes(rate, duration, sick is not None), *(note for values in vertical for note in _in_g(values))]
+    return Rating(position, tuple(found), rate, duration, hours, sick, tuple(notes))
 
 
 def motion_sickness_dose(weighted: Array, rate: float) -> float:
@@ -206,6 +207,19 @@ def _notes(rate: float, duration: float, with_sickness: bool) -> list[str]:
     if with_sickness and duration < 1.0 / WF.f1:
         found.append(f"shorter than {1.0 / WF.f1:g} s: the motion sickness dose has not seen one swing of 0.1 Hz")
     return found
+
+
+ONE_G = 0.05
+"""By how much the mean of a vertical acceleration may differ from 1 and be gravity in g: a sensor that leans by 18
+degrees reads as much less."""
+
+
+def _in_g(vertical: Array) -> list[str]:
+    """Say where a vertical acceleration looks like one in g: its mean is that of gravity."""
+    mean = float(np.mean(vertical))
+    if abs(abs(mean) - 1.0) > ONE_G or np.std(vertical) > 1.0:
+        return []
+    return [f"its mean is {mean:.3g} m/s2: in g that would be gravity; is the unit g?"]
 
 
 def same_in(unit: str, acceleration: Array) -> Array:

@@ -86,6 +86,15 @@ class Damper(Frozen):
             _check_effect(name, values)
         return effects
 
+    @field_validator("base")
+    @classmethod
+    def _one_row_each(cls, base: tuple[BaseRow, ...]) -> tuple[BaseRow, ...]:
+        labels = [(row.voltage_V, row.temperature_degC) for row in base]
+        twice = next((i for i, label in enumerate(labels) if label in labels[:i]), None)
+        if twice is not None:
+            raise InsideError("a row before it has the same control signal and temperature; say those of each", twice)
+        return base
+
     @model_validator(mode="after")
     def _reference(self) -> Damper:
         for name in self.effects:

@@ -19,6 +19,8 @@ Returned = TypeVar("Returned")
 
 _IN_CONFIG = re.compile(r"\brig\.files\.\d+(?:\.(?=\w)|: ?)|\brig\.(?=limits)")
 """Where an argument would stand in a config, which there is none of here."""
+_INTO_ENTRIES = re.compile(r"write `setting: (.+?)` into the entries of `rig` that are it")
+"""Advice to name a setting in a config, which `pzd.Test` does here."""
 
 
 def in_python(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
@@ -39,7 +41,8 @@ def as_python_errors() -> Iterator[None]:
         yield
     except UserError as error:
         kind = OSError if isinstance(error, FilesError) else ValueError
-        raise kind("\n".join(_IN_CONFIG.sub("", message) for message in error.messages)) from None
+        told = (_INTO_ENTRIES.sub(r"pass setting=\1 to the pzd.Test that are it", one) for one in error.messages)
+        raise kind("\n".join(_IN_CONFIG.sub("", message) for message in told)) from None
 
 
 def numbers(name: str, values: Any, size: int | None = None) -> Array:
@@ -110,6 +113,20 @@ def label(name: str, value: Any, size: int) -> Array | float | None:
         raise TypeError(f"{name}: must be a number, or one for each time (got bool)")
     found = numbers(name, value, None if np.size(value) == 1 else size)
     return float(found[0]) if found.size == 1 else found
+
+
+def jobs_of(given: Any) -> int:
+    """Return a number of processes.
+
+    Raises
+    ------
+    TypeError, ValueError : when it is no whole number from 1 on
+    """
+    if isinstance(given, bool) or not isinstance(given, int | np.integer):
+        raise TypeError(f"jobs: must be a whole number (got {type(given).__name__})")
+    if given < 1:
+        raise ValueError(f"jobs: must be 1 or more (got {given})")
+    return int(given)
 
 
 def control_of(given: Any) -> Control:

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from pzd.artefacts import Identified, Rig
 from pzd.artefacts.changes import Changes
-from pzd.front.arguments import control_of, in_python
+from pzd.front.arguments import control_of, in_python, jobs_of
 from pzd.front.pipelines import pipeline_on
 from pzd.front.results import Result, new_axes
 from pzd.quantities import FORCE, VELOCITY, Control
@@ -143,7 +143,7 @@ def changes(
     states, made = [], []
     for called, tests in (("tests_before", tests_before), ("tests_after", tests_after)):
         one = pipeline_on(tests, signal, None, limits, called, seed=seed, **blocks)
-        one.jobs = jobs
+        one.jobs = jobs_of(jobs)
         one.setting()  # refuses several
         one.through("identify")
         made.append(one)
@@ -161,6 +161,6 @@ def changes(
         config.identify,
         config.measured_rig,
         signal,
-        jobs,
+        jobs_of(jobs),
     )
     return ComparedStates(changes_between(diagnosed, states[1], config.diagnose, config.identify, signal), signal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
@@ -52,6 +53,12 @@ def named_by_control(function: Callable[Given, Array]) -> Callable[Given, Array]
     return called
 
 
+FEWEST_MOVED = 5
+"""Samples of a motion: fewer have no speed that could be told from noise."""
+BEYOND_KNOWN = 0.02
+"""Share of the span of a control signal or temperature by which a value may lie beyond: a recorded one has noise."""
+
+
 class Damper(Result):
     """A damper: the Bingham element over the control signal and temperature, and its effects."""
 
@@ -68,7 +75,8 @@ class Damper(Result):
 
         Parameters
         ----------
-        base : rows of T0_N, C_Ns_per_m, k_N_per_m, each with voltage_V and temperature_degC where there are several
+        base : rows of T0_N, C_Ns_per_m, k_N_per_m, each with voltage_V and temperature_degC where there are several; a
+            list of mappings, or a DataFrame such as `to_frame` returns
         effects : parameters of each effect by its name, see `pzd effects`
         reference_temperature_degC : of `temperature_drift`
         zero_m : displacement from which `end_stop` and `gas_spring` count
@@ -80,6 +88,8 @@ class Damper(Result):
         """
         if isinstance(base, Mapping):
             base = [base]
+        if hasattr(base, "columns"):
+            base = [{name: value for name, value in row.items() if value == value} for row in base.to_dict("records")]
         data = {"base": base, "effects": effects or {}, "zero_m": zero_m}
         data["reference_temperature_degC"] = reference_temperature_degC
         signal = control_of(control)
@@ -129,10 +139,16 @@ class Damper(Result):
         ValueError : when they are no curve of a damper
         """
         from pzd.damper.curve import curve_of
+        from pzd.rig.files.refusals import HIGHEST_SPEED
+        from pzd.rig.preflight.sense import FORCES
 
         if isinstance(sign, bool) or sign not in (1, -1):
             raise ValueError(f"sign: must be 1 or -1 (got {sign!r})")
         v, signal = numbers("velocity", velocity), control_of(control)
+        if (fastest := float(np.max(np.abs(v), initial=0.0))) > HIGHEST_SPEED:
+            raise ValueError(
+                f"velocity: {fastest:g} m/s, above {HIGHEST_SPEED:g} m/s; are these mm/s, or is it the force?"
+            )
         values = None if voltage is None else numbers("voltage", np.atleast_1d(voltage))
         shape = np.shape(force)
         if len(shape) == 2 and shape[0] == v.size:
@@ -144,6 +160,11 @@ class Damper(Result):
         if forces.shape[1] != count:
             raise ValueError(
                 f"force: {forces.shape[1]} columns for {count} values of the {signal.name}; give one for each"
+            )
+        if not FORCES[0] <= (largest := float(np.max(np.abs(forces)))) <= FORCES[1]:
+            warnings.warn(
+                f"force: {largest:.3g} N at most, {FORCES[0]:g} to {FORCES[1]:g} N is usual: check the unit (N or kN)",
+                stacklevel=2,
             )
         return CurveDamper(curve_of(v, forces, values, int(sign)), signal)
 
@@ -210,16 +231,21 @@ class Damper(Result):
         """Return a motion with control signal and temperature, as `force` takes them."""
         from pzd.damper.motion import Motion
         from pzd.record import clock_fault
+        from pzd.rig.files.refusals import LONGEST_STROKE
         from pzd.signals.cycles import cycles
         from pzd.signals.kinematics import kinematics
         from pzd.signals.measures import noise_beside_motion
 
         t = numbers("time", time)
-        if t.size < 2:
-            raise ValueError(f"time: a motion needs two samples at least (got {t.size})")
+        if t.size < FEWEST_MOVED:
+            raise ValueError(f"time: a motion needs {FEWEST_MOVED} samples at least (got {t.size})")
         if fault := clock_fault(t):
             raise ValueError(f"time: index {fault[0]}: {fault[1]}")
         x = numbers("displacement", displacement, t.size)
+        if np.ptp(x) > LONGEST_STROKE:
+            raise ValueError(
+                f"displacement: a stroke of {np.ptp(x):.4g} m, above {LONGEST_STROKE:g} m; are these millimetres?"
+            )
         v = None if velocity is None else numbers("velocity", velocity, t.size)
         clean = kinematics(t, x, cycles(t, x))
         channels = [
@@ -268,7 +294,9 @@ class Damper(Result):
         known = self.voltages if name == "voltage" else self.temperatures
         called = self.control.name if name == "voltage" else name
         if value is not None:
-            return label(called, value, size)
+            found = label(called, value, size)
+            _warn_beyond(called, found, known, self.control.unit if name == "voltage" else "degC")
+            return found
         if name == "voltage" and len(known) > 1:
             listed = ", ".join(f"{each:g}" for each in known)
             raise ValueError(
@@ -382,6 +410,23 @@ class CurveDamper(Damper):
             for v, force in zip(self.measured.velocity, self.measured.force[:, n], strict=True)
         ]
         return pd.DataFrame(rows)
+
+
+def _warn_beyond(called: str, given: Array | float | None, known: tuple[float, ...], unit: str) -> None:
+    """Warn where a control signal or temperature lies outside what the damper is known at."""
+    if given is None or not known:
+        return
+    low, high = known[0], known[-1]
+    margin = BEYOND_KNOWN * max(high - low, abs(high), abs(low))
+    least, most = float(np.min(given)), float(np.max(given))
+    if least < low - margin or most > high + margin:
+        where = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        worst = most if most > high + margin else least
+        warnings.warn(
+            f"{called}: {worst:g} {unit} lies beyond what the damper is known at, {where} {unit}; its parameters are "
+            "those at the end",
+            stacklevel=2,
+        )
 
 
 def _shown(value: float | tuple[float, ...]) -> str:

@@ -42,7 +42,11 @@ def pipeline_of(config: RunConfig, artefacts: Mapping[str, Artefact]) -> InMemor
     """Return the pipeline of a config in which some artefacts are made already, by their folders."""
     here = Path()
     run = Run(here, here / "config.yaml", config.control.signal())
-    return InMemory(config, run, stages(config), lambda _: None, artefacts=dict(artefacts))
+    return InMemory(config, run, stages(config), _nothing_said, artefacts=dict(artefacts))
+
+
+def _nothing_said(line: str) -> None:
+    """Leave out what a command prints; no lambda, so that a result can be pickled."""
 
 
 def pipeline_on(

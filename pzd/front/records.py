@@ -46,6 +46,15 @@ FEWEST = 2
 """Samples of a test."""
 
 
+def _kept(prepared: PreflightRecord) -> PreflightRecord:
+    """Return the same record, whose channels nobody changes in place: they were checked, and belong together."""
+    for quantity in CHANNELS:
+        channel = getattr(prepared.record, quantity.name)
+        if channel is not None:
+            channel.flags.writeable = False
+    return prepared
+
+
 def _as_argument(advice: Advice) -> str | None:
     """Return advice about a file as what to pass here; None where an array needs none."""
     match advice.key:
@@ -123,7 +132,7 @@ class Test(Result):
             if (found := label(quantity.name, values, clock.size)) is not None:
                 channels[quantity] = found
         try:
-            self.source = from_arrays(name or UNNAMED, channels, setting, Limits(), Control())
+            self.source = _kept(from_arrays(name or UNNAMED, channels, setting, Limits(), Control()))
             """The record as it was prepared, with its cycles."""
         except DataError as error:
             raise DataError(
@@ -134,7 +143,7 @@ class Test(Result):
     def of(cls, prepared: PreflightRecord) -> Self:
         """Return the test of a record that was read from a file."""
         made = cls.__new__(cls)
-        made.source = prepared
+        made.source = _kept(prepared)
         return made
 
     @property
@@ -218,6 +227,7 @@ class Test(Result):
             f"Test {self.name}: {record.time.size} samples at {record.rate:.4g} Hz, {moves}",
             f"  stroke {stroke:.4g} mm, speed up to {speed:.3g} m/s, {forces}",
             f"  {', '.join(([self.setting] if self.setting else []) + at) or 'no setting, voltage or temperature'}",
+            *(f"  {finding}" for finding in self.findings),
         ]
 
     def _labels(self) -> tuple[tuple[str, float | None, str], ...]:
@@ -266,6 +276,11 @@ def read(
     """
     from pzd.rig.files.reading import read as read_files
 
+    if hasattr(path, "columns"):
+        raise TypeError(
+            "path: a table is read by pzd.Test(time=..., displacement=..., force=...), a column each, in SI units "
+            f"(got {type(path).__name__})"
+        )
     given: list[Any] = [path] if isinstance(path, str | PathLike) or not isinstance(path, Iterable) else list(path)
     wrong = [type(one).__name__ for one in given if not isinstance(one, str | PathLike)]
     if wrong:

@@ -52,6 +52,8 @@ class Result(ABC):
 
 def new_axes(ax: Axes | None) -> Axes:
     """Return axes to draw on: those given, else those of a new figure."""
+    if ax is not None and not hasattr(ax, "plot"):
+        raise TypeError(f"ax: must be the Axes to draw on, such as axs[0] of several (got {type(ax).__name__})")
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt

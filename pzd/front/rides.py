@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from pzd.artefacts import Diagnosed, Rides, SummaryRow, WeightedRow
-from pzd.front.arguments import in_python
+from pzd.front.arguments import in_python, jobs_of
 from pzd.front.dampers import CurveDamper, Damper, table_stage
 from pzd.front.pipelines import config_of
 from pzd.front.results import Result, new_axes
@@ -155,6 +155,6 @@ def ride(
     config = config_of(front.control, simulate={**block, **keys_of_the_block}, seed=seed).simulate
     if len(axles) == 1 and not isinstance(front, CurveDamper):
         alone = Diagnosed.undiagnosed(front.model)
-        return CarRide(simulate(config, alone, table_stage(front, {}), seed, Path(), jobs), front.control)
+        return CarRide(simulate(config, alone, table_stage(front, {}), seed, Path(), jobs_of(jobs)), front.control)
     mounted = [(None if isinstance(one, CurveDamper) else one.model, table_stage(one, {})) for one in axles]
-    return CarRide(simulate_on_axles(config, mounted, seed, Path(), jobs), front.control)
+    return CarRide(simulate_on_axles(config, mounted, seed, Path(), jobs_of(jobs)), front.control)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from pzd.artefacts import Artefact, ComfortRow, Diagnosed, Diagnosis, Identified, ParameterRow, Rig, SummaryRow
-from pzd.front.arguments import as_python_errors, in_python
+from pzd.front.arguments import as_python_errors, in_python, jobs_of
 from pzd.front.dampers import Damper
 from pzd.front.results import Result, frame_of, new_axes
 from pzd.schema.errors import ConfigError
@@ -173,9 +173,15 @@ def run(
     """
     from pzd.pipeline.command import execute, opened
     from pzd.pipeline.run_summary import summary_with_stale
+    from pzd.pipeline.stages import stages
 
+    if isinstance(overrides, str) or not all(isinstance(one, str) for one in overrides):
+        raise TypeError(f"overrides: must be a list such as ['seed=2'] (got {overrides!r})")
     given = opened(_path("config", config), _path("runs", runs), overrides)
-    execute(given, until, force=force, jobs=jobs, say=lambda _: None)
+    names = ["run", *(stage.name for stage in stages(given.config))]
+    if until not in names:
+        raise ValueError(f"until: must be one of {', '.join(names)} (got {until!r})")
+    execute(given, until, force=force, jobs=jobs_of(jobs), say=lambda _: None)
     return FinishedRun(given.run, summary_with_stale(given))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from typing_extensions import override
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, ParameterRow, Rig, identified_damper
-from pzd.front.arguments import as_python_errors, control_of, in_python
+from pzd.front.arguments import as_python_errors, control_of, in_python, jobs_of
 from pzd.front.dampers import Damper
 from pzd.front.pipelines import pipeline_on
 from pzd.front.results import Result, frame_of, new_axes
@@ -42,7 +42,7 @@ class Identification(Result):
         """The control signal."""
         return self.behind.run.control
 
-    @cached_property
+    @property
     def parameters(self) -> pd.DataFrame:
         """T0, C and k with 95 % intervals, a row a condition of every setting: the columns of parameters.csv."""
         return frame_of(self.identified.rows, ParameterRow, self.control)
@@ -70,7 +70,7 @@ class Identification(Result):
     @override
     def to_frame(self) -> pd.DataFrame:
         """Return `parameters`."""
-        return self.parameters.copy()
+        return self.parameters
 
     @override
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -124,7 +124,7 @@ def identify(
     """
     block = {"law": law, **keys_of_the_block}
     made = pipeline_on(tests, control_of(control), setting, seed=seed, identify=block)
-    made.jobs = jobs
+    made.jobs = jobs_of(jobs)
     made.through("identify")
     if setting is not None:
         made.setting()  # refuses one that no test has
@@ -178,7 +178,7 @@ class Finding(Result):
         """Why, in a sentence."""
         return self.diagnosis.reason
 
-    @cached_property
+    @property
     def parameters(self) -> pd.DataFrame:
         """Parameters of the adopted effects with 95 % intervals, a row a value."""
         import pandas as pd
@@ -220,7 +220,7 @@ class Finding(Result):
     @override
     def to_frame(self) -> pd.DataFrame:
         """Return `parameters`."""
-        return self.parameters.copy()
+        return self.parameters
 
     @override
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -273,7 +273,7 @@ def diagnose(
     """
     blocks: dict[str, Any] = {"identify": identify or {}, "diagnose": keys_of_the_block}
     made = pipeline_on(tests, control_of(control), setting, limits, seed=seed, **blocks)
-    made.jobs = jobs
+    made.jobs = jobs_of(jobs)
     made.setting()
     made.through("diagnose")
     return Finding(made)

@@ -459,7 +459,7 @@ def departure_from_mean_cycle(folded: Array, step: float = 0.0) -> float:
     lengths = [points // part for part in CYCLE_PARTS if points >= 2 * part]
     rounding = step**2 / 12.0
     changes = (_excess_scatter(folded[:, apart:] - folded[:, :-apart], 2.0 * rounding) for apart in lengths)
-    return max(_excess_scatter(folded, rounding), *changes)
+    return max((_excess_scatter(folded, rounding), *changes))
 
 
 def _excess_scatter(cycles: Array, rounding: float) -> float:

@@ -13,6 +13,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import Array
+from pzd.schema.errors import DataError
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +56,14 @@ def changes_between(
 
     Raises
     ------
-    DataError : when no test of the second state can be compared
+    DataError : when no test of the second state can be compared, or one state alone has a control signal
     """
+    without = [s for s in (before, after) if all(record.voltage is None for record in s.records)]
+    if len(without) == 1:
+        raise DataError(
+            f"{without[0].name}: its tests have no {control.name}, those of the other state do; give it in both states, "
+            "or in neither"
+        )
     findings = findings_between(before, after, diagnose, identify, control)
     return Compared(changes_of(findings), _cycles(findings), (*before.undetermined, *after.undetermined))
 
