@@ -89,7 +89,7 @@ class Damper(Result):
         if isinstance(base, Mapping):
             base = [base]
         if hasattr(base, "columns"):
-            base = [{name: value for name, value in row.items() if value == value} for row in base.to_dict("records")]
+            base = [row.dropna().to_dict() for _, row in base.astype(object).iterrows()]
         data = {"base": base, "effects": effects or {}, "zero_m": zero_m}
         data["reference_temperature_degC"] = reference_temperature_degC
         signal = control_of(control)

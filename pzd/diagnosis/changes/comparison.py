@@ -61,8 +61,8 @@ def changes_between(
     without = [s for s in (before, after) if all(record.voltage is None for record in s.records)]
     if len(without) == 1:
         raise DataError(
-            f"{without[0].name}: its tests have no {control.name}, those of the other state do; give it in both states, "
-            "or in neither"
+            f"{without[0].name}: its tests have no {control.name}, those of the other state do; give it in both, or in "
+            "neither"
         )
     findings = findings_between(before, after, diagnose, identify, control)
     return Compared(changes_of(findings), _cycles(findings), (*before.undetermined, *after.undetermined))

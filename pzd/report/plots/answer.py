@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -138,7 +139,7 @@ def closing(context: ReportContext) -> Iterator[Panel]:
     ax.grid(visible=False, axis="y")
     texts = "; ".join(f"{bar.name} {number(_rms_in_percent(bar.w_s), 2)} %" for bar in held_out)
     also = "; ".join(f"{bar.name} {number(_rms_in_percent(bar.w_s), 2)} %" for bar in candidates)
-    alt = f"Error on held-out tests, of the force: {texts}." + (f" Each alone, on seen tests: {also}." if also else "")
+    alt = f"Error on held-out tests, of the force: {texts}." + (f" On seen tests: {also}." if also else "")
     beyond = sum(stroke > right for stroke in strokes)
     ticks = " Strokes: each test, predicted by a fit to the others." if strokes else ""
     ticks += f" {beyond} of them are beyond the edge." if beyond else ""
@@ -162,17 +163,24 @@ def _held_out_bars(context: ReportContext) -> list[_Bar]:
 
 
 def _candidate_bars(context: ReportContext) -> list[_Bar]:
-    """Return what each candidate leaves of the tests seen, the adopted ones first, then those that leave least."""
+    """Return what each candidate leaves of the tests seen, the adopted ones first, then those that leave least.
+
+    Adopted ones that the ranking has with one error were fitted together, and share a bar.
+    """
     diagnosis = context.diagnosed.diagnosis
-    ranked = sorted(diagnosis.ranking, key=lambda one: (one.effect not in diagnosis.effects, one.gap_after))
+    adopted = set(diagnosis.effects)
+    ranked = sorted(diagnosis.ranking, key=lambda one: (one.effect not in adopted, one.gap_after))
+    together = [
+        list(group) for _, group in groupby(ranked, lambda one: one.gap_after if one.effect in adopted else one.effect)
+    ]
     return [
         _Bar(
-            spelled(one.effect),
-            one.gap_after,
-            FINAL if one.effect in diagnosis.effects else MUTED,
-            one.gap_standard_error,
+            " + ".join(spelled(each.effect) for each in group),
+            group[0].gap_after,
+            FINAL if group[0].effect in adopted else MUTED,
+            group[0].gap_standard_error,
         )
-        for one in ranked[:_MOST_CANDIDATES]
+        for group in together[:_MOST_CANDIDATES]
     ]
 
 

@@ -21,6 +21,7 @@ from pzd.report.blocks import (
     number,
     percent,
     sentence,
+    spelled,
 )
 from pzd.report.columns import PAGE, Column, Quantity, Table
 from pzd.report.context import ReportContext
@@ -108,8 +109,9 @@ def verdict(context: ReportContext) -> str:
         known = [name for name in diagnosis.effects if name not in for_prediction]
         added = [name for name in diagnosis.effects if name in for_prediction]
         found = f"; {listed(effects_in_words(known))} is part of it" if known else ""
-        stands = "it stands" if len(added) == 1 else "they stand"
-        found += f"; {listed(effects_in_words(added))} predicts, whatever {stands} for" if added else ""
+        stands = "it stands" if len(added) == 1 else "these stand"
+        best = listed([spelled(name) for name in added])
+        found += f"; unseen tests are predicted best with {best}, whatever {stands} for" if added else ""
         text = f"Something is missing that the library of effects does not explain{found}"
     return f"{text}."
 

@@ -19,6 +19,9 @@
   const steady = data.table.length ? figure("velocity [m/s]", "force of the table [N]") : null;
   const plots = [[overV, "v", false], [overX, "x", false], [overT, "t", false], [rest, "t", true]];
 
+  for (const [name, , colour, dash] of curves)  // the box of each curve stands on a sample of its line
+    by(`explorer-${name}`).parentElement.style.borderBottom = `3px ${dash === "solid" ? "solid" : "dashed"} ${colour}`;
+
   // --- What is drawn ---
 
   const drawn = new Map();
