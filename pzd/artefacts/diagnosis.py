@@ -141,6 +141,14 @@ class Region(Frozen):
     share_of_gap: float
 
 
+CYCLES_OF_TEST = 10
+"""Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
+CYCLES_IN_WORDS = "ten"
+"""The same in words."""
+STEPS_PER_CYCLE = 4.0
+"""Changes of the control signal per cycle in a test that steps it."""
+
+
 class NextTest(Frozen):
     """The rig test that would separate the rivals best; without rivals, one where the force is known least."""
 

@@ -14,6 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from pzd.artefacts import NextTest
+from pzd.artefacts.diagnosis import CYCLES_IN_WORDS, CYCLES_OF_TEST, STEPS_PER_CYCLE
+from pzd.artefacts.rig import same_motion
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -32,14 +34,6 @@ POINTS = 400
 """Samples of a cycle."""
 CYCLES = 2
 """Cycles that are simulated; the last is compared."""
-MANY_CYCLES = "ten"
-"""Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
-MANY = 10
-"""The same in figures."""
-SAME_TEST = 0.05
-"""Share by which frequency, amplitude or control signal of a test may be off, and it is the one that was asked for."""
-STEPS_HZ = 4.0
-"""Changes of the voltage per cycle in the test that steps it."""
 SMALLEST_AMPLITUDE = 0.02
 """Share of the largest amplitude below which no test is tried: the resolution of the stroke shows in it."""
 ROUND_OFF = 1e-12
@@ -176,7 +170,7 @@ def repeated_longest_test(
         stepped = bool(moving) and len(envelope.voltages) > 1
         if stepped or not any(_was_run(test, frequency, amplitude, voltage) for test in recorded):
             return NextTest(
-                waveform="sine, voltage stepped" if stepped else f"sine, {MANY_CYCLES} cycles",
+                waveform="sine, voltage stepped" if stepped else f"sine, {CYCLES_IN_WORDS} cycles",
                 frequency_Hz=frequency,
                 amplitude_m=rounded_down(amplitude),
                 middle_m=envelope.middle,
@@ -189,12 +183,12 @@ def repeated_longest_test(
 
 def _was_run(test: CleanedRecord, frequency: float, amplitude: float, voltage: float | None) -> bool:
     """Whether a test repeats a motion of that frequency [Hz] and amplitude [m] many times, at that control signal."""
-    if test.cycles is None or test.cycles.count < MANY or not test.constant:
+    if test.cycles is None or test.cycles.count < CYCLES_OF_TEST or not test.constant:
         return False
     level = test.record.median_voltage()
     pairs = [(1.0 / test.cycles.period, frequency), (0.5 * float(np.ptp(test.record.displacement)), amplitude)]
     pairs += [(level, voltage)] if level is not None and voltage is not None else []
-    return all(math.isclose(one, other, rel_tol=SAME_TEST) for one, other in pairs)
+    return all(same_motion(one, other) for one, other in pairs)
 
 
 def _candidate_tests(envelope: OperatingEnvelope, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
@@ -264,7 +258,7 @@ def test_motion(
     channels = [np.tile(np.fft.irfft(spectrum * rate**order, POINTS), CYCLES) for order in range(3)]
     signal = None
     if isinstance(voltage, tuple):
-        signal = np.where((STEPS_HZ * phase) % 2.0 < 1.0, voltage[0], voltage[1])
+        signal = np.where((STEPS_PER_CYCLE * phase) % 2.0 < 1.0, voltage[0], voltage[1])
     elif voltage is not None:
         signal = np.full(time.size, voltage)
     warm = None if temperature is None else np.full(time.size, temperature)

@@ -38,7 +38,8 @@ def diagnose(
 
     Returns
     -------
-    the verdict, and the damper with the adopted effects; unchanged where there are none, and under the knee law
+    the verdict, and the damper with the adopted effects; unchanged where none is adopted, and where a knee law misses
+    nothing visible
     """
     from pzd.diagnosis.workflow import diagnose_setting
 

@@ -127,7 +127,7 @@ in for that, and "moved" with the amplitude of the test. Not tuned."""
 LONE_END_STOP_BEGINS_BY = 0.9
 """The same where one motion alone reaches the stop.
 
-Reason: a friction that gives by a twentieth of the stroke before it slips was named so (a rig of other authorship)."""
+Reason: a friction that gives by a twentieth of the stroke before it slips looks like such a stop."""
 OTHER_MOTION = 0.05
 """Difference of amplitude or peak speed, as a share, from which two motions are not one.
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, KneeRow, ParameterRow, Prediction, identified_damper
-from pzd.artefacts.diagnosis import Support, Verdict
+from pzd.artefacts.diagnosis import CYCLES_IN_WORDS, Support, Verdict
 from pzd.damper.confounders import known
 from pzd.damper.fitted_laws.knee import mean_bleed
 from pzd.damper.model import BaseRow, Damper
@@ -29,7 +29,7 @@ from pzd.diagnosis.cross_validation import CrossValidation
 from pzd.diagnosis.fit.least_squares import polished
 from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples, shown_force
 from pzd.diagnosis.gap import ResidualCheck, gap_with_nuisances, probability_of_noise, visible_gap
-from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_longest_test
+from pzd.diagnosis.next_test import OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.roles import TRAINING
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
@@ -568,7 +568,8 @@ def insufficient_data_diagnosis(recorded: Sequence[CleanedRecord], envelope: Ope
         reason=(
             "the records are too short to tell noise from what is missing: too little of them repeats a cycle, and "
             f"a motion that does not repeat takes {FEWEST_SAMPLES} samples to fit, the same to choose and to hold out "
-            f"(the longest record has {longest}); record {MANY_CYCLES} cycles of a test, of at least 40 samples each"
+            f"(the longest record has {longest}); record {CYCLES_IN_WORDS} cycles of a test, "
+            "of at least 40 samples each"
         ),
         gap=None,
         next_test=repeated_longest_test(recorded, envelope),

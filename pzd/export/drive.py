@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from pzd.artefacts import NextTest
+from pzd.artefacts.diagnosis import CYCLES_OF_TEST, STEPS_PER_CYCLE
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -19,10 +20,6 @@ from pzd.rig.config import Limits
 from pzd.rig.stand.waveforms import Course, Waveform, started, waveforms
 from pzd.schema.errors import ConfigError
 
-LOOPS = 10
-"""Cycles of a test: noise is separated from what repeats, and a quarter of the cycles chooses, another is held out."""
-STEPS_PER_CYCLE = 4.0
-"""Changes of the control signal per cycle where it is stepped, as `next_test` asks."""
 RATE_HZ = 1024.0
 """Least rate of the samples, of which a loop takes a whole number [Hz]: a controller interpolates between them."""
 _SLACK = 1e-3  # of a limit: what was recorded is known no closer
@@ -149,7 +146,7 @@ def _waveform(text: str) -> Waveform:
         ) from None
 
 
-def drive(plan: Plan, loops: int = LOOPS) -> Drive:
+def drive(plan: Plan, loops: int = CYCLES_OF_TEST) -> Drive:
     """Return the history: the motion grows smoothly from rest, repeats, and dies down as it grew.
 
     Parameters

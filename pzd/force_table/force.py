@@ -33,7 +33,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class OperatingEnvelope:
+class ReachedSpeeds:
     """Largest tested speed over temperature and voltage, NaN where nothing was tested."""
 
     temperatures: Array
@@ -61,9 +61,9 @@ class OperatingEnvelope:
         return float(np.interp(voltage, self.voltages[tested], row[tested]))
 
 
-def operating_envelope(
+def reached_speeds(
     records: Sequence[Record], temperatures: Sequence[float | None], voltages: Sequence[float | None]
-) -> OperatingEnvelope:
+) -> ReachedSpeeds:
     """Find the largest speed of the samples nearest to each temperature and voltage.
 
     Parameters
@@ -83,7 +83,7 @@ def operating_envelope(
         speeds[i, j] = max((float(np.quantile(v, QUANTILE)) for v in mine if v.size), default=np.nan)
     if np.isfinite(speeds).any():
         speeds[speeds >= SAME_TESTS * np.nanmax(speeds)] = np.nanmax(speeds)
-    return OperatingEnvelope(T, U, speeds)
+    return ReachedSpeeds(T, U, speeds)
 
 
 def _cells(record: Record, temperatures: Array, voltages: Array) -> NDArray[np.int64]:
@@ -140,7 +140,7 @@ def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
 
 
 def grid(
-    config: TableConfig, damper: Damper, temperatures: Sequence[float | None], envelope: OperatingEnvelope
+    config: TableConfig, damper: Damper, temperatures: Sequence[float | None], envelope: ReachedSpeeds
 ) -> TableNodes:
     """Find nodes between which straight lines follow the damper's law within the tolerance.
 
@@ -177,7 +177,7 @@ def grid(
     return TableNodes(tuple(temperatures), tuple(map(float, given)) or (None,), refined(speeds, over_speed, allowed))
 
 
-def _speeds(config: TableConfig, envelope: OperatingEnvelope) -> Array:
+def _speeds(config: TableConfig, envelope: ReachedSpeeds) -> Array:
     """Return speeds spaced by their square root, and those of the envelope."""
     tested = np.unique(envelope.speeds[np.isfinite(envelope.speeds)])
     largest = max(config.speed_max_m_per_s, *tested) if tested.size else config.speed_max_m_per_s
@@ -219,9 +219,7 @@ def refined(nodes: Array, law: Callable[[Array], Array], allowed: float) -> Arra
     return found
 
 
-def force_rows(
-    config: TableConfig, damper: Damper, nodes: TableNodes, envelope: OperatingEnvelope
-) -> tuple[ForceRow, ...]:
+def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, envelope: ReachedSpeeds) -> tuple[ForceRow, ...]:
     """Return one row per node; outside the envelope clamped, empty or by the model, as the config says.
 
     Parameters

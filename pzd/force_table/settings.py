@@ -18,7 +18,7 @@ from pzd.artefacts.table import Neighbours, on_axis
 from pzd.damper.compose import static_force, steady_force
 from pzd.damper.model import Damper
 from pzd.force_table.config import TableConfig
-from pzd.force_table.force import OperatingEnvelope, TableNodes, grid, operating_envelope, temperatures_of, voltages_of
+from pzd.force_table.force import ReachedSpeeds, TableNodes, grid, reached_speeds, temperatures_of, voltages_of
 from pzd.quantities import Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 from pzd.schema.errors import ConfigError
@@ -40,7 +40,7 @@ class TestedSetting:
     """Of its parameters, rising [degC]."""
     voltages: tuple[float | None, ...]
     """Of its parameters, rising [V]."""
-    envelope: OperatingEnvelope
+    envelope: ReachedSpeeds
     nodes: TableNodes
 
     def limit(self, place: Place) -> float:
@@ -89,7 +89,7 @@ def between_settings(
         damper = identified_damper(identified, name)
         records = [record for record in rig.records if record.setting == name]
         T, U = temperatures_of(damper), voltages_of(damper)
-        envelope = operating_envelope(records, T, U)
+        envelope = reached_speeds(records, T, U)
         return TestedSetting(name, damper, T, U, envelope, grid(config, damper, T, envelope))
 
     wanted = config.between(names)

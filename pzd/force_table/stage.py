@@ -16,7 +16,7 @@ from pzd.quantities import Control
 from pzd.record import Record, mid_stroke
 
 if TYPE_CHECKING:
-    from pzd.force_table.force import OperatingEnvelope
+    from pzd.force_table.force import ReachedSpeeds
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +63,7 @@ def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Con
     damper = diagnosed.damper
     records = [record for record in rig.records if record.setting == setting]
     given = force.temperatures_of(diagnosed.baseline), force.voltages_of(diagnosed.baseline)
-    envelope = force.operating_envelope(records, *given)
+    envelope = force.reached_speeds(records, *given)
     temperatures = _temperatures(table, damper, records)
     return _within(table, damper, temperatures, envelope, control, _reached_stroke(records))
 
@@ -81,7 +81,7 @@ def untested_table(table: TableConfig, damper: Damper, control: Control) -> Tabl
 
     temperatures = force.temperatures_of(damper)
     T, U = (np.array([v or 0.0 for v in values]) for values in (temperatures, force.voltages_of(damper)))
-    known = force.OperatingEnvelope(T, U, np.full((T.size, U.size), table.speed_max_m_per_s))
+    known = force.ReachedSpeeds(T, U, np.full((T.size, U.size), table.speed_max_m_per_s))
     return _within(table, damper, temperatures, known, control)
 
 
@@ -89,7 +89,7 @@ def _within(
     table: TableConfig,
     damper: Damper,
     temperatures: Sequence[float | None],
-    envelope: OperatingEnvelope,
+    envelope: ReachedSpeeds,
     control: Control,
     stroke: float | None = None,
 ) -> Table:

@@ -61,9 +61,9 @@ def amount(value: float | None, unit: str, digits: int = 3) -> str:
     return text if text == DASH or not shown else f"{text}{NO_BREAK}{shown}"
 
 
-def percent(share: float | None, digits: int = 2) -> str:
+def percent(share: float | None) -> str:
     """Write a share in percent."""
-    return DASH if share is None else f"{number(100.0 * share, digits)}{NO_BREAK}%"
+    return DASH if share is None else f"{number(100.0 * share, 2)}{NO_BREAK}%"
 
 
 def minutes(value: float | None) -> str:

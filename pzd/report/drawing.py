@@ -175,9 +175,9 @@ def axes_with_difference(
     return figure, upper, lower
 
 
-def ticks_named(ax: Axes, labels: Sequence[str], first: float = 0.0) -> None:
+def ticks_named(ax: Axes, labels: Sequence[str]) -> None:
     """Name the rows of a plot, one a unit of its vertical axis, however alike their names are."""
-    ax.set_yticks(np.arange(len(labels)) + first, [shortened(label) for label in labels])
+    ax.set_yticks(np.arange(len(labels)), [shortened(label) for label in labels])
 
 
 def legend(figure: Figure, columns: int = 3) -> None:

@@ -25,6 +25,7 @@ def tone(frequency: float, rate: float, seconds: float, phase: float = 1.0) -> n
 def test_tones_agree_with_the_analytic_columns_to_a_thousandth() -> None:
     with TABLE.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    assert rows
     for row in rows:
         for frequency, of in ((float(row["f_true_Hz_10^(n/10)"]), "true"), (float(row["f_nominal_Hz"]), "nominal")):
             rate, periods = 2000.0, max(round(20.0 * frequency), 8)

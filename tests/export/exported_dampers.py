@@ -10,7 +10,7 @@ from pzd.artefacts import Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.export.content import Content
 from pzd.force_table.config import TableConfig
-from pzd.force_table.force import OperatingEnvelope, force_rows, grid, temperatures_of, voltages_of
+from pzd.force_table.force import ReachedSpeeds, force_rows, grid, temperatures_of, voltages_of
 from pzd.force_table.lookup import inverse_rows
 from pzd.quantities import Control
 from pzd.simulate.cars import cars
@@ -127,7 +127,7 @@ def content_of(damper: Damper, **table: Any) -> Content:
     """What is exported of a damper whose rig reached 0.6 m/s."""
     config = TableConfig(**table)
     temperatures, voltages = temperatures_of(damper), voltages_of(damper)
-    envelope = OperatingEnvelope(
+    envelope = ReachedSpeeds(
         np.array([t or 0.0 for t in temperatures]),
         np.array([u or 0.0 for u in voltages]),
         np.full((len(temperatures), len(voltages)), 0.6),

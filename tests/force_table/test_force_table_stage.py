@@ -142,7 +142,7 @@ def test_rows_outside_the_envelope_are_marked_and_clamped_or_empty_as_configured
     assert np.isfinite(Lookup.of(tables["error"]).force(100.0, 0.37))
 
 
-def test_each_voltage_has_the_operating_envelope_of_its_own_tests() -> None:
+def test_each_voltage_has_the_reached_speeds_of_its_own_tests() -> None:
     damper = damper_of([2])
     amplitudes = {0.0: 0.03, 50.0: 0.03, 100.0: 0.01, 150.0: 0.01}
     records = tuple(sine(U, 22.0, amplitude) for U, amplitude in amplitudes.items())

@@ -87,7 +87,7 @@ def test_force_is_linear_between_temperatures_and_constant_beyond() -> None:
     assert Lookup.of(lookup).force(50.0, 0.2) == pytest.approx(bingham(None, 50.0, 0.2) * 0.8)
 
 
-def test_inside_follows_the_operating_envelope_of_each_voltage() -> None:
+def test_inside_follows_the_reached_speeds_of_each_voltage() -> None:
     table = table_of(bingham)
     rows = [
         row.model_copy(update={"inside": int(abs(row.velocity_m_per_s) <= (0.4 if row.voltage_V == 0.0 else 0.2))})

@@ -54,7 +54,7 @@ def test_the_smaller_gap_is_harder_than_constant_c(
 ) -> None:
     constant = (beside["F19a-c"].computed, beside["F19b-c"].computed)
     rows = [row for row in rides_by_gap[SMALL_GAP].rides.summary if row.fidelity == "table"]
-    assert all(row.peak_abs_aK_m_per_s2 > peak for row, peak in zip(rows, constant, strict=True) if peak is not None)
+    assert all(peak is not None and row.peak_abs_aK_m_per_s2 > peak for row, peak in zip(rows, constant, strict=True))
 
 
 def test_by_the_table_the_exposure_time_grows_to_minutes_at_most(beside: dict[str, ReferenceRow]) -> None:

@@ -22,7 +22,8 @@ from pzd.damper.fitted_laws import fitted_laws, knee, seal
 from pzd.damper.model import BaseRow, Damper, acts_at_a_place, against_nature
 from pzd.damper.parameter_rows import bingham_parameters, rows_per_voltage
 from pzd.diagnosis.changes.pairs import Comparison, stacked
-from pzd.diagnosis.fit.problem import BOUND
+from pzd.diagnosis.fit.least_squares import LARGEST_LOG_RATIO
+from pzd.diagnosis.fit.problem import BOUND, Unknown
 from pzd.diagnosis.search.determination import force_at_rest
 from pzd.quantities import BINGHAM
 from pzd.record import Array, Complex
@@ -35,8 +36,8 @@ LARGEST_DELAY_S = 0.005
 """Largest change of the delay that is the recorder's [s]: a longer one is the damper's."""
 LEAST_FRICTION = 0.01
 """Share of the peak force from which T0 changes in proportion to itself; a smaller one in that of the peak force."""
-LARGEST_RATIO = 3.0
-"""C and k change by up to e^3 = 20 times: beyond, they are not shown by the tests."""
+MOST_IN_PROPORTION = 20.0
+"""By how many times itself a size given by control signal changes: as far as e^3 takes C and k."""
 FRICTION_STARTS = (0.0, -0.7, 1.5)
 RATIO_STARTS = (0.0, -1.2, 1.2)
 """Where a fit of T0 and one of C or k begin: a linearised step is worth little over a factor of three."""
@@ -394,7 +395,7 @@ def _of_element(first: FirstState, comparisons: Sequence[Comparison]) -> list[Ca
     compared = sorted({nearest_node(groups, c.voltage) for c in comparisons})
     found = []
     for name, unit in ELEMENT_UNITS.items():
-        low, high = (first.least_friction(None), np.inf) if name == "T0" else (-LARGEST_RATIO, LARGEST_RATIO)
+        low, high = (first.least_friction(None), np.inf) if name == "T0" else (-LARGEST_LOG_RATIO, LARGEST_LOG_RATIO)
         whole = Coordinate(name, name, "damper", unit, 1.0, None, low, high, name != "T0")
         starts = FRICTION_STARTS if name == "T0" else RATIO_STARTS
         found.append(Candidate(name, "damper", (whole,), tuple((x,) for x in starts)))
@@ -433,14 +434,12 @@ def _absent(first: FirstState, name: str) -> Candidate:
     coordinates = []
     for p in known()[name].parameters:
         scale = p.search.scale(first.scales) or 1.0
-        low, high = p.low / scale, p.high / scale
+        low, high = Unknown(name, p, scale).bounds
         if p.search.logarithmic:
-            limits = float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
-            coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, True, scale, True))
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, low, high, True, scale, True))
         else:
             neutral = p.neutral if np.isfinite(p.neutral) else 0.0
-            least, most = p.search.within
-            limits = max(low, least, -BOUND) - neutral / scale, min(high, most, BOUND) - neutral / scale
+            limits = low - neutral / scale, high - neutral / scale
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, scale, None, *limits, False, neutral, True))
 
     def searched(c: Coordinate, x: float) -> float:
@@ -504,11 +503,17 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
         if p.optional and not np.any(value):
             without.append(p.name)
         if isinstance(value, tuple):
-            coordinates.append(Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, 20.0))
+            coordinates.append(
+                Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, MOST_IN_PROPORTION)
+            )
             if not p.search.logarithmic:
-                added.append(replace(coordinates[-1], low=-20.0, added=True))
+                added.append(replace(coordinates[-1], low=-most, added=True))
         elif p.search.logarithmic and value > 0.0:
             limits = float(np.log(max(p.low / value, 1.0 / BOUND))), float(np.log(min(p.high / value, BOUND)))
+            searched = Unknown(name, p, p.search.scale(first.scales) or 1.0)
+            low, high = (bound - searched.to_search(value) for bound in searched.bounds)
+            if low <= 0.0 <= high:  # what lies outside of what a diagnosis searches was written by hand
+                limits = max(limits[0], low), min(limits[1], high)
             coordinates.append(Coordinate(name, p.name, "damper", p.unit, value, None, *limits, True, value))
         else:
             scale = p.search.scale(first.scales) or 1.0

@@ -94,7 +94,7 @@ def _change(found: Findings, mine: Sequence[tuple[Coordinate, float, float]], sh
     )
 
 
-def unchanged_of_laws(found: Findings, best: Fitted, reported: Sequence[Change]) -> list[Change]:
+def unchanged_of_laws(best: Fitted, reported: Sequence[Change]) -> list[Change]:
     """Return the numbers of laws of both states that may be as they were, where others of the same law are not."""
     by_key = {(change.name, change.parameter): change for change in reported}
     as_they_were: list[Change] = []

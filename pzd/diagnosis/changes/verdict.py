@@ -44,7 +44,7 @@ def changes_of(found: Findings) -> Changes:
     best, rivals = found.best, _rivals(found)
     difference = found.difference(best)
     reported = changed_quantities(found, best)
-    still = unchanged_of_laws(found, best, reported)
+    still = unchanged_of_laws(best, reported)
     reported = [change for change in reported if change not in still]
     hardly = [name for name in may_be_as_before(reported, of=("damper", "stand")) if is_little(reported, name)]
     reported = [change for change in reported if change.name not in hardly]

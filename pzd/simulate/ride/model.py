@@ -364,7 +364,7 @@ _TINY = 1e-300
 class DynamicDamper(NamedTuple):
     """One damper at one temperature, its parameters linear over the effective voltage and held beyond.
 
-    See `pzd.damper.compose.Nodes`; the memory is that of one damper at each axle.
+    See `pzd.damper.parameter_rows.DamperNodes`; the memory is that of one damper at each axle.
     """
 
     voltages: Array

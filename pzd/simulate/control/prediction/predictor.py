@@ -151,8 +151,6 @@ class Settings(NamedTuple):
     """Observations between two choices."""
     hold_steps: int
     """Steps of the plant while a voltage is held."""
-    tail_steps: int
-    """Steps of the plant behind it."""
     load_weight: float
     """Weight of the wheel loads [-]."""
     remembered: float
@@ -302,7 +300,6 @@ def predictor_of(
         observation_s=control_period,
         every=round(own.hold_s / control_period),
         hold_steps=hold_steps,
-        tail_steps=tail_steps,
         load_weight=own.load_weight,
         remembered=math.exp(-control_period / MEMORY_S),
         margin=own.margin,
