@@ -81,7 +81,8 @@ def parts(nearly: Mapping[str, str], shares: Mapping[str, float]) -> dict[str, s
 
 WITHIN_FIRST_ORDER = 2.0
 """Times the error of refits up to which that to first order stands for it: where a plain damper misses more than half
-of the force, a fold without its most telling test is far from linear, and the estimate may be thousands of times too large."""
+of the force, a fold without its most telling test is far from linear, and the estimate may be thousands of times too
+large."""
 
 
 def _total(first_order: PredictionError, refitted: PredictionError) -> float:

@@ -503,9 +503,8 @@ def _present(first: FirstState, name: str) -> list[Candidate]:
         if p.optional and not np.any(value):
             without.append(p.name)
         if isinstance(value, tuple):
-            coordinates.append(
-                Coordinate(name, p.name, "damper", p.unit, float(np.mean(value)), None, -1.0, MOST_IN_PROPORTION)
-            )
+            size, most = float(np.mean(value)), MOST_IN_PROPORTION
+            coordinates.append(Coordinate(name, p.name, "damper", p.unit, size, None, -1.0, most))
             if not p.search.logarithmic:
                 added.append(replace(coordinates[-1], low=-most, added=True))
         elif p.search.logarithmic and value > 0.0:
