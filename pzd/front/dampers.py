@@ -161,12 +161,13 @@ class Damper(Result):
             raise ValueError(
                 f"force: {forces.shape[1]} columns for {count} values of the {signal.name}; give one for each"
             )
+        made = CurveDamper(curve_of(v, forces, values, int(sign)), signal)
         if not FORCES[0] <= (largest := float(np.max(np.abs(forces)))) <= FORCES[1]:
             warnings.warn(
                 f"force: {largest:.3g} N at most, {FORCES[0]:g} to {FORCES[1]:g} N is usual: check the unit (N or kN)",
                 stacklevel=2,
             )
-        return CurveDamper(curve_of(v, forces, values, int(sign)), signal)
+        return made
 
     @property
     def effects(self) -> dict[str, dict[str, float | tuple[float, ...]]]:

@@ -85,6 +85,14 @@ def test_scale_time_and_unit(rng: np.random.Generator) -> None:
     assert in_g.a_w == pytest.approx(one.a_w, rel=1e-6)
 
 
+def test_gravity_in_g_is_told(rng: np.random.Generator) -> None:
+    """The mean of a vertical acceleration is 9.81 m/s2, or none; 1 is that of one in g."""
+    ride = 0.05 * rng.standard_normal(4000)
+    assert "is the unit g?" in repr(pzd.rate(1.0 + ride, 500.0))
+    for told in (pzd.rate(1.0 + ride, 500.0, unit="g"), pzd.rate(ride, 500.0), pzd.rate(1.0 + ride, 500.0, axis="x")):
+        assert "unit g" not in repr(told)
+
+
 def test_every_position_has_its_axes_and_rates_them() -> None:
     record = tone(5.0, 500.0, 8.0)
     for position, axes in POSITIONS.items():

@@ -257,3 +257,32 @@ def test_what_rubber_gives_is_no_gas_spring_of_one_rate(rng: np.random.Generator
     spring = Damper(base=(row,), effects={"gas_spring": {"k_g": 150.0}})
     told = diagnosed(sines(spring, rng, (0.0,), **settings), **only).diagnosis
     assert (told.verdict, told.effects) == ("named", ("gas_spring",)), told.reason
+
+
+@pytest.mark.parametrize("alpha", [-0.15, 0.1])
+@pytest.mark.parametrize(("true", "parameter"), [("viscous_asymmetry", "alpha_C"), ("asymmetry", "alpha")])
+def test_damping_that_differs_between_the_directions_is_told_from_all_that_differs(
+    true: str, parameter: str, alpha: float, rng: np.random.Generator
+) -> None:
+    """Between both lies alpha T0, which at two levels of T0 is no one constant beside the element."""
+    records = sines(damper_of(TWO, **{true: {parameter: alpha}}), rng, TWO, tests=SEVERAL, cycles=4, noise=5e-3)
+    told = diagnosed(records).diagnosis
+    assert (told.verdict, told.effects) == ("named", (true,)), told.reason
+    value = told.parameters[true][parameter]
+    assert value.value == pytest.approx(alpha, abs=0.005)
+
+
+def test_without_friction_both_kinds_of_asymmetry_are_one(rng: np.random.Generator) -> None:
+    viscous = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=2500.0, k_N_per_m=3e5),))
+    records = sines(viscous.with_effect("asymmetry", {"alpha": 0.15}), rng, (0.0,), tests=SEVERAL, cycles=4, noise=5e-3)
+    told = diagnosed(records).diagnosis
+    assert (told.verdict, told.effects, told.rivals) == ("named", ("asymmetry",), ()), told.reason
+
+
+def test_beside_a_constant_force_one_friction_leaves_open_which_asymmetry_it_is() -> None:
+    one, two = damper_of((150.0,)), damper_of(TWO)
+    effects = {"viscous_asymmetry": {"alpha_C": 0.2}, "preload_offset": {"F_0": 150.0}}
+    assert nearly_others(one.model_copy(update={"effects": effects}), 2000.0)["viscous_asymmetry"] == "asymmetry"
+    assert "viscous_asymmetry" not in nearly_others(two.model_copy(update={"effects": effects}), 2000.0)
+    del effects["preload_offset"]
+    assert nearly_others(one.model_copy(update={"effects": effects}), 2000.0) == {}

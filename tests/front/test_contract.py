@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import pickle
 import pkgutil
 import re
 import subprocess
@@ -114,6 +115,27 @@ def test_what_was_given_may_change_afterwards() -> None:
     test = pzd.Test(**arrays)
     arrays["force"] *= 0.0
     assert np.max(np.abs(test.force)) > 300.0
+
+
+def test_the_channels_of_a_test_are_not_changed_in_place() -> None:
+    test = pzd.Test(**sine())
+    before = test.force.copy()
+    with pytest.raises(ValueError, match="read-only"):
+        test.force -= 50.0
+    np.testing.assert_array_equal(test.force, before)
+
+
+def test_what_looks_wrong_is_told_with_the_test() -> None:
+    arrays = sine()
+    assert "check the units" not in repr(pzd.Test(**arrays))
+    assert "peak force" in repr(pzd.Test(**arrays | {"force": 1e-3 * arrays["force"]}))
+    assert "degC, degF or K" in repr(pzd.Test(**arrays, temperature=295.0))
+
+
+def test_a_short_and_coarse_record_is_a_test() -> None:
+    """Cycles of twelve samples are too few to be compared in parts."""
+    time = np.arange(36) / 24.0
+    assert pzd.Test(time, 0.03 * np.sin(4.0 * np.pi * time), 500.0 * np.cos(4.0 * np.pi * time)).time.size == 36
 
 
 CHANGES = {
@@ -386,6 +408,51 @@ def test_a_voltage_may_be_a_number_or_move_and_must_be_given_where_it_matters(hi
     assert single.curve([1.0])[0] == pytest.approx(3000.0)
 
 
+def test_results_are_pickled_and_frames_are_copies(tests: list[pzd.Test]) -> None:
+    found = pzd.identify(tests, control=CONTROL)
+    again = pickle.loads(pickle.dumps(found))
+    assert repr(again) == repr(found)
+    assert repr(pickle.loads(pickle.dumps(found.damper))) == repr(found.damper)
+    found.parameters["T0_N"] = 0.0
+    pd.testing.assert_frame_equal(found.parameters, again.parameters)
+
+
+def test_a_damper_is_made_of_its_own_frame(hidden: pzd.Damper) -> None:
+    again = pzd.Damper(hidden.to_frame(), hidden.effects, control=CONTROL)
+    pd.testing.assert_frame_equal(again.to_frame(), hidden.to_frame())
+    rigid = pzd.Damper({"T0_N": 300.0, "C_Ns_per_m": 1000.0, "k_N_per_m": np.inf})
+    assert repr(pzd.Damper(rigid.to_frame())) == repr(rigid)
+
+
+def test_what_lies_beyond_the_known_is_warned_of(hidden: pzd.Damper) -> None:
+    """A recorded signal may lie beyond by its noise."""
+    assert hidden.curve([0.1], voltage=1.51) == hidden.curve([0.1], voltage=1.5)
+    for beyond in (1.6, -0.5, 1e6):
+        with pytest.warns(UserWarning, match=r"current: .* beyond what the damper is known at, 0 to 1\.5 A"):
+            hidden.curve([0.1], voltage=beyond)
+
+
+@pytest.mark.parametrize(
+    ("argument", "scale", "words"), [(0, 1000.0, "millimetres"), (1, 1.0, "5 samples at least")], ids=["mm", "short"]
+)
+def test_a_motion_that_is_none_of_a_damper_is_refused(argument: int, scale: float, words: str, hidden) -> None:
+    arrays = sine()
+    part = slice(None) if argument == 0 else slice(3)
+    with pytest.raises(ValueError, match=words):
+        hidden.force(arrays["time"][part], scale * arrays["displacement"][part], voltage=0.0)
+
+
+@pytest.mark.parametrize(("jobs", "error"), [("2", TypeError), (True, TypeError), (0, ValueError), (-1, ValueError)])
+def test_a_number_of_processes_is_whole_and_positive(jobs, error: type[Exception], tests: list[pzd.Test]) -> None:
+    with pytest.raises(error, match="jobs"):
+        pzd.identify(tests, control=CONTROL, jobs=jobs)
+
+
+def test_several_axes_are_not_the_axes_to_draw_on(hidden: pzd.Damper) -> None:
+    with pytest.raises(TypeError, match=r"axs\[0\]"):
+        hidden.plot(np.array([1, 2]))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -434,6 +501,19 @@ def test_a_folder_without_a_run_and_a_config_that_is_none_are_told(tmp_path: Pat
         pzd.run(3)
 
 
+@pytest.mark.parametrize(
+    ("keys", "error", "words"),
+    [
+        ({"overrides": "seed=2"}, TypeError, "overrides: must be a list"),
+        ({"until": "identfy"}, ValueError, "until: must be one of run, synthesise, identify"),
+        ({"jobs": 0}, ValueError, "jobs"),
+    ],
+)
+def test_a_mistake_in_a_run_is_told(keys, error: type[Exception], words: str, root: Path, tmp_path: Path) -> None:
+    with pytest.raises(error, match=words):
+        pzd.run(root / "configs/quickstart.yaml", tmp_path, **keys)
+
+
 # ---------------------------------------------------------------- changes
 
 
@@ -454,6 +534,14 @@ def test_what_changed_is_named_with_its_size(tests: list[pzd.Test], arrays, gene
     assert json.dumps(what.as_dict())
     with pytest.raises(TypeError, match="tests_after"):
         pzd.changes(tests, 3)
+
+
+def test_a_control_signal_in_one_state_alone_is_no_comparison(arrays) -> None:
+    with_current, without = (
+        [pzd.Test(**{**each, "setting": "new", **more}) for each in arrays[:2]] for more in ({}, {"voltage": None})
+    )
+    with pytest.raises(ValueError, match="before: its tests have no current"):
+        pzd.changes(without, with_current, control=CONTROL)
 
 
 def test_the_changes_are_those_of_the_command(arrays, tmp_path: Path) -> None:

@@ -97,6 +97,7 @@ def test_its_force_along_a_motion_has_no_memory() -> None:
         ({"voltage": [0.0, 1.0]}, ValueError, "1 columns for 2"),
         ({"force": np.column_stack([FORCE, FORCE]), "voltage": [1.0, 1.0]}, ValueError, "stands twice"),
         ({"velocity": [0.0], "force": [0.0]}, ValueError, "2 points"),
+        ({"velocity": 1e3 * VELOCITY}, ValueError, "mm/s"),
         ({"force": "curve.csv"}, TypeError, "array of numbers"),
         ({"force": np.where(VELOCITY > 0.4, np.nan, FORCE)}, ValueError, "no finite number"),
     ],
@@ -104,6 +105,11 @@ def test_its_force_along_a_motion_has_no_memory() -> None:
 def test_what_is_no_curve_is_refused(change, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         pzd.Damper.from_curve(**{"velocity": VELOCITY, "force": FORCE, **change})
+
+
+def test_a_force_in_another_unit_is_warned_of() -> None:
+    with pytest.warns(UserWarning, match="N or kN"):
+        pzd.Damper.from_curve(VELOCITY, 1e-3 * FORCE)
 
 
 # ---------------------------------------------------------------- front and rear

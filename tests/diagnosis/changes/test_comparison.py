@@ -71,6 +71,7 @@ EFFECTS: list[tuple[str, dict[str, float], float]] = [
     ("orifice_quadratic", {"q": 2500.0}, 0.1),
     ("lash", {"delta": 8e-4}, 0.1),
     ("asymmetry", {"alpha": 0.08}, 0.1),
+    ("viscous_asymmetry", {"alpha_C": 0.15}, 0.1),
     ("gas_spring", {"k_g": 2500.0}, 0.1),
 ]
 
