@@ -23,11 +23,11 @@ Reason: 0 to 15 % where damping alone differed between the directions (four rigs
 def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
     """Return what else an offset may be by its value and what stands beside it; None for an offset.
 
-    `asymmetry` where it goes with the control signal, `viscous_asymmetry` where it undoes that of the friction;
-    `accumulator` where it is what a gas of another exponent than that of its law leaves.
+    `asymmetry` where it goes with the control signal; `viscous_asymmetry` where it does so beside one, or undoes that of
+    the friction; `accumulator` where it is what a gas of another exponent than that of its law leaves.
     """
     if isinstance(values["F_0"], tuple):
-        return "asymmetry"
+        return "viscous_asymmetry" if "asymmetry" in beside.effects else "asymmetry"
     gas = np.asarray(beside.effects.get("accumulator", {}).get("F_g", 0.0))
     least, most = sorted(1.0 - other_gas(exponent)[0] for exponent in EXPONENTS)
     if gas.any() and np.all((least * gas <= values["F_0"]) & (values["F_0"] <= most * gas)):
