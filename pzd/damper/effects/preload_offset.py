@@ -23,8 +23,8 @@ Reason: 0 to 15 % where damping alone differed between the directions (four rigs
 def _of_friction_or_gas(values: EffectValues, beside: Beside) -> str | None:
     """Return what else an offset may be by its value and what stands beside it; None for an offset.
 
-    `asymmetry` where it goes with the control signal; `viscous_asymmetry` where it does so beside one, or undoes that of
-    the friction; `accumulator` where it is what a gas of another exponent than that of its law leaves.
+    `asymmetry` where it goes with the control signal; `viscous_asymmetry` where it does so beside one, or undoes
+    that of the friction; `accumulator` where it is what a gas of another exponent than that of its law leaves.
     """
     if isinstance(values["F_0"], tuple):
         return "viscous_asymmetry" if "asymmetry" in beside.effects else "asymmetry"
