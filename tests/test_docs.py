@@ -116,9 +116,9 @@ def test_every_command_and_option_has_its_help() -> None:
 
 
 def test_the_readme_names_every_effect_and_how_many_there_are() -> None:
-    table = page("README.md").partition("## The twenty-two effects")[2].partition("## ")[0]
+    table = page("README.md").partition("## The twenty-three effects")[2].partition("## ")[0]
     assert set(re.findall(r"`([a-z]+_?[a-z_]*)`", table)) == set(library())
-    assert len(library()) == 22
+    assert len(library()) == 23
 
 
 def test_the_readme_is_three_pages() -> None:

@@ -49,7 +49,7 @@ VIRTUAL = """rig:
         (FILES + "diagnose: {visible: 0.25}\n", "diagnose.visible: must be less than or equal to 0.1 (got 0.25)"),
         (FILES + "diagnose: {force: [lash], forbid: [lash]}\n", "force and forbid contradict each other on lash"),
         (FILES + "diagnose: {forbid: [lash, lash]}\n", "diagnose.forbid: one is named twice"),
-        (VIRTUAL, "two rows of damper.base have the same voltage and temperature"),
+        (VIRTUAL, "damper.base.1: another row before it has the same voltage and temperature"),
     ],
 )
 def test_a_config_that_cannot_be_meant_so_is_refused(tmp_path: Path, text: str, told: str) -> None:

@@ -92,7 +92,7 @@ class Damper(Frozen):
         labels = [(row.voltage_V, row.temperature_degC) for row in base]
         twice = next((i for i, label in enumerate(labels) if label in labels[:i]), None)
         if twice is not None:
-            raise InsideError("a row before it has the same control signal and temperature; say those of each", twice)
+            raise InsideError("another row before it has the same voltage and temperature; say those of each", twice)
         return base
 
     @model_validator(mode="after")

@@ -132,7 +132,7 @@ C_ALONE = {"asymmetry": {"alpha": 0.2}, "preload_offset": {"F_0": -0.2 * 300.0}}
         ({"accumulator": {"F_g": 400.0, "L": 0.08}, "preload_offset": {"F_0": 400.0}}, 1e6, {}),
         # Half of its way at 400 N: the mount is nearly all that gives.
         ({"frame_compliance": {"d_f": 4e-4, "F_f": 400.0}}, np.inf, {}),
-        (C_ALONE, 2e5, {"preload_offset": "asymmetry"}),
+        (C_ALONE, 2e5, {"preload_offset": "viscous_asymmetry"}),
         ({**C_ALONE, "preload_offset": {"F_0": 60.0}}, 2e5, {}),
         ({"preload_offset": {"F_0": 60.0}}, 2e5, {}),
     ],

@@ -413,7 +413,8 @@ def test_results_are_pickled_and_frames_are_copies(tests: list[pzd.Test]) -> Non
     again = pickle.loads(pickle.dumps(found))
     assert repr(again) == repr(found)
     assert repr(pickle.loads(pickle.dumps(found.damper))) == repr(found.damper)
-    found.parameters["T0_N"] = 0.0
+    frame = found.parameters
+    frame["T0_N"] = 0.0
     pd.testing.assert_frame_equal(found.parameters, again.parameters)
 
 
@@ -450,7 +451,7 @@ def test_a_number_of_processes_is_whole_and_positive(jobs, error: type[Exception
 
 def test_several_axes_are_not_the_axes_to_draw_on(hidden: pzd.Damper) -> None:
     with pytest.raises(TypeError, match=r"axs\[0\]"):
-        hidden.plot(np.array([1, 2]))  # type: ignore[arg-type]
+        hidden.plot(np.array([1, 2]))
 
 
 @pytest.mark.parametrize(

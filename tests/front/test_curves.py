@@ -109,7 +109,7 @@ def test_what_is_no_curve_is_refused(change, error: type[Exception], words: str)
 
 def test_a_force_in_another_unit_is_warned_of() -> None:
     with pytest.warns(UserWarning, match="N or kN"):
-        pzd.Damper.from_curve(VELOCITY, 1e-3 * FORCE)
+        pzd.Damper.from_curve(VELOCITY, 5e-4 * FORCE)
 
 
 # ---------------------------------------------------------------- front and rear

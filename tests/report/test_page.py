@@ -335,7 +335,7 @@ def test_what_came_in_for_its_prediction_is_not_said_to_be_in_the_damper(words_o
     support = dict(zip(effects, (known, added), strict=True))
     read = Reader(run.with_diagnosis(verdict="unexplained", effects=effects, support=support).told().page)
     assert "(orifice_quadratic) is part of it;" in read.text
-    assert "(bouc_wen) predicts, whatever it stands for." in read.text
+    assert "unseen tests are predicted best with bouc wen, whatever it stands for." in read.text
 
 
 def test_a_test_at_a_voltage_between_two_others_is_told_with_what_it_is_for(words_only: None, run: Any) -> None:

@@ -282,9 +282,6 @@ class VirtualEntry(Frozen):
     def _complete(self) -> VirtualEntry:
         faults = [*self._missing("voltages_V", _needs_voltage(self.damper))]
         faults += self._missing("temperatures_degC", _needs_temperature(self.damper))
-        rows = [(row.voltage_V, row.temperature_degC) for row in self.damper.base]
-        if len(set(rows)) < len(rows):
-            faults.append("two rows of damper.base have the same voltage and temperature")
         names = [planned.name for planned in self.plan()]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
