@@ -472,7 +472,7 @@ def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
 
 
 def _not_shown(problem: Problem, damper: Damper) -> list[str]:
-    """List the effects of a damper that hardly change its misfit: without the tests that show them, none is found.
+    """List the effects of a damper whose removal raises its misfit by less than the BIC penalty: no test shows them.
 
     The stop at the end of the longest test is one, where that is held out: refitted, it stands just beyond the others,
     and is as hard as the last of their noise likes.

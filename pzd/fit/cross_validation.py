@@ -105,7 +105,7 @@ class PredictionError:
 
     @property
     def shapes(self) -> PredictionError:
-        """The same of shapes alone: what each test has of its own, and no damper can know, taken out."""
+        """Errors with each test's own offset, gain and delay projected out, which no damper can know."""
         return self if self.beyond_own is None else replace(self, error=self.beyond_own)
 
     @property

@@ -30,7 +30,7 @@ WAIT_S = 10.0
 
 @dataclass(frozen=True)
 class Where:
-    """Where work is done, as the config says."""
+    """Engine that does the work, with its block of the config and its folders."""
 
     how: EngineConfig
     block: str

@@ -130,7 +130,7 @@ class Candidate:
 
     @property
     def side(self) -> int:
-        """That of its coordinates."""
+        """+1 or -1 of a stop in extension or compression alone, else 0."""
         return next((c.side for c in self.coordinates if c.side), 0)
 
     @property

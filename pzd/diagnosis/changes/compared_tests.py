@@ -150,7 +150,7 @@ class ModelError:
         return cls(share, np.maximum(octaves, 0.0), away)
 
     def beside(self, comparison: Comparison, times: float = 1.0) -> Comparison:
-        """Return a comparison with this error as that of the model in it, so many times as large."""
+        """Return a comparison with this error of the model in it, scaled by a factor."""
         power = np.zeros(comparison.rate.size)
         size = min(power.size, self.power.size)
         power[:size] = self.power[:size] * (times * comparison.peak) ** 2

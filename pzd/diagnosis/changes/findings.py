@@ -92,7 +92,7 @@ class Findings:
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
-        """What is compared."""
+        """Pairs of tests whose difference of force is fitted."""
         return self.search.regression.comparisons
 
     def difference(self, best: Fitted) -> Difference:

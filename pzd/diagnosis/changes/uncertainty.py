@@ -143,7 +143,7 @@ class Uncertainty:
         return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
     def _told_apart(self, columns: Sequence[Array]) -> Array:
-        """Return (p,) by how much further a force without a name moves each coordinate with the others free.
+        """Return the (p,) factors by which the correlation with the others widens the error of each coordinate.
 
         All of it may lie in any one direction: where a valve opens and how far go together, and each is known as badly
         as the tests tell them apart.
@@ -237,5 +237,5 @@ class Uncertainty:
 
 
 def hides(force: float, slopes: Array) -> Array:
-    """Return the (p,) standard error of coordinates by a force without a name: the whole of it may be theirs."""
+    """Return the (p,) standard errors of coordinates if a force without a name were wholly due to each of them."""
     return np.where(slopes > 0.0, force / LEVEL / np.where(slopes > 0.0, slopes, 1.0), 0.0)
