@@ -328,6 +328,16 @@ def test_a_low_pass_of_the_force_is_told_with_its_corner(kind: str, order: int, 
     assert np.mean([7.0 < corner < 14.0 for corner in corners]) >= 0.8
 
 
+def test_no_low_pass_is_told_that_would_take_the_motion_away(rng: np.random.Generator) -> None:
+    """Below twice the frequency of the motion: a stroke without force, as of air in the oil, looks alike."""
+    told: list[Finding] = []
+    for one in rng.spawn(FEWER):
+        damper = drawn(one, friction=float(one.uniform(0.3, 1.0)))
+        corner = 1.4 * damper.frequency
+        told += sizes([damper.recorded(one, low_passed(damper, 1, corner, damper.force))], amplifier)
+    assert not [finding for finding in told if finding.check == "filter"]
+
+
 def test_filters_that_differ_between_the_channels_are_told(rng: np.random.Generator) -> None:
     corners = []
     for one in rng.spawn(FEWER):

@@ -24,12 +24,14 @@ from states import (
 )
 
 from pzd.damper.effect import Scales
+from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.changes.candidates import Coordinate, FirstState, candidates, element_of
 from pzd.diagnosis.changes.compared_tests import ModelError, comparisons_of
 from pzd.diagnosis.changes.comparison import changes_between
 from pzd.diagnosis.changes.findings import Findings, findings_between
 from pzd.diagnosis.changes.quantities import _values
+from pzd.diagnosis.changes.reason import beside_effects
 from pzd.diagnosis.changes.regression import Fitted
 from pzd.diagnosis.changes.selection import Search, _scaled
 from pzd.diagnosis.changes.uncertainty import Uncertainty
@@ -332,6 +334,39 @@ def test_the_gas_of_an_accumulator_is_among_what_may_have_changed(rng: np.random
     damper = drawn_damper(rng, (0.0,))
     found = findings(rng, damper, damper.with_effect("accumulator", {"F_g": 60.0, "L": 3.0 * STROKE}))
     assert "accumulator" in names_told(changes_of(found))
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_changed_effect_keeps_to_what_a_diagnosis_searches(there: bool, rng: np.random.Generator) -> None:
+    """Gas that is compressed by more of its length than 1/1.5 has the pole of its law within what a car drives."""
+    plain = drawn_damper(rng, (0.0,))
+    known = {"accumulator": {"F_g": 60.0, "L": 3.0 * STROKE}, "frame_compliance": {"d_f": 1e-3, "F_f": 200.0}}
+    before = plain.model_copy(update={"effects": known}) if there else plain
+    found = findings(rng, before, plain)
+    checked = 0
+    for candidate in found.search.candidates:
+        effect = library().get(candidate.name)
+        for c in candidate.coordinates if effect is not None else ():
+            search = effect.parameter(c.parameter).search
+            least, most = search.within
+            scale = search.scale(found.first.scales)
+            ends = (c.start * np.exp(end) if c.logarithmic else c.start + end * c.scale for end in (c.low, c.high))
+            if np.isfinite([least, most]).any() and candidate.name in known and c.node is None:
+                low, high = (end / scale for end in ends)
+                assert least - 1e-9 <= low <= high <= most + 1e-9, c
+                checked += 1
+    assert checked >= 2
+
+
+def test_friction_and_damping_are_told_beside_the_effects_that_they_stand_with() -> None:
+    def told(effects: dict[str, dict[str, float]], *changed: str) -> list[str]:
+        first, before = SimpleNamespace(damper=SimpleNamespace(effects=effects)), SimpleNamespace(name="new")
+        return beside_effects(cast("Findings", SimpleNamespace(first=first, before=before)), changed)
+
+    orifice = {"orifice_quadratic": {"q": 2000.0}, "gas_spring": {"k_g": 1000.0}}
+    assert told(orifice, "T0", "lash") == ["T0 is that beside orifice_quadratic of new, not that of identify"]
+    assert told(orifice, "T0", "C") == ["T0 and C are those beside orifice_quadratic of new, not those of identify"]
+    assert told(orifice, "lash") == told({"gas_spring": {"k_g": 1000.0}}, "T0") == told({}, "C") == []
 
 
 def test_what_has_no_name_leaves_open_what_did_not_change_and_so_does_what_was_too_small(
