@@ -31,7 +31,7 @@ from pzd.diagnosis.fit.likelihood import FEWEST_SAMPLES, enough_samples, shown_f
 from pzd.diagnosis.gap import ResidualCheck, gap_with_nuisances, probability_of_noise, visible_gap
 from pzd.diagnosis.next_test import OperatingEnvelope, repeated_longest_test
 from pzd.diagnosis.roles import TRAINING
-from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
+from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit, distinct
 from pzd.diagnosis.search.candidates import force_change
 from pzd.diagnosis.search.determination import first_undetermined, varying_strengths
 from pzd.fit.intervals import LEVEL
@@ -331,7 +331,7 @@ def verdict_confidence(selection: Selection, config: DiagnoseConfig, beside: Col
     for step in selection.steps:
         if step.chosen in selection.adopted:
             low_force = selection.final_evidence.whole.scales.low_force
-            tried = {c.effect: detection_from_fit(c, low_force) for c in step.contenders}
+            tried = {c.effect: detection_from_fit(c, low_force) for c in distinct(step)}
             sure *= _total_probability(_probabilities(tried, config.visible), named)
     sure *= _total_probability(_remaining_probabilities(selection, config), {None, *selection.undecided, *beside})
     for match in selection.competing_confounders:

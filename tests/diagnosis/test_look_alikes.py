@@ -14,7 +14,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.fit.least_squares import fit, refit, standard_errors
-from pzd.diagnosis.search.acceptance import has_come_down_to, rivals_of
+from pzd.diagnosis.search.acceptance import SelectionStep, distinct, has_come_down_to, rivals_of
 from pzd.diagnosis.search.candidates import candidate, converged
 from pzd.diagnosis.search.determination import nearly_others
 from pzd.diagnosis.search.forward_selection import reweighted, swap_step
@@ -55,6 +55,9 @@ def test_a_law_that_gives_the_same_force_by_more_numbers_is_no_rival(
     lenient = DiagnoseConfig(rival_bic=-0.1 * chosen.delta_bic)
     assert rivals_of(chosen, (chosen, other), lenient) == ()
     assert rivals_of(other, (chosen, other), lenient) == (true,)
+    # Nor does it take anything of the confidence.
+    assert distinct(SelectionStep((chosen, other), true)) == [chosen]
+    assert distinct(SelectionStep((other, chosen), limit)) == [other, chosen]
 
 
 def test_a_gas_that_hardens_no_more_beside_a_spring_is_an_offset(rng: np.random.Generator) -> None:

@@ -511,14 +511,23 @@ def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseCon
     tried : candidates of the step, best first, the chosen one among them
     config : the block diagnose: by how much of BIC a rival may be worse
     """
-    others = [
-        c
-        for c in tried
-        if c.effect != chosen.effect and not says_the_same(c, chosen) and not has_come_down_to(c, chosen)
-    ]
+    others = [c for c in tried if c.effect != chosen.effect and not _is_chosen_by_more(c, chosen)]
     return tuple(
         c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic or _is_limit_of(c, chosen)
     )
+
+
+def distinct(step: SelectionStep) -> list[Candidate]:
+    """Return the contenders of a step without those that are the chosen one by more numbers, which say nothing else."""
+    chosen = next((c for c in step.contenders if c.effect == step.chosen), None)
+    if chosen is None:
+        return list(step.contenders)
+    return [c for c in step.contenders if c is chosen or not _is_chosen_by_more(c, chosen)]
+
+
+def _is_chosen_by_more(other: Candidate, chosen: Candidate) -> bool:
+    """Whether a law gives the force of the chosen one by more numbers, or has come to the limit where it is that."""
+    return says_the_same(other, chosen) or has_come_down_to(other, chosen)
 
 
 def says_the_same(other: Candidate, chosen: Candidate) -> bool:
