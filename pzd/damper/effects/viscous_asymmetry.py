@@ -11,16 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Beside, Effect, EffectValues, Parameter, Search, growing
-
-NOT_SEEN = 0.005
-"""Share of the peak force below which alpha_C T0, or how it differs between levels, does not tell the two apart.
-
-Reason: the default of `diagnose.visible`, below which a verdict names nothing."""
+from pzd.signals.measures import VISIBLE
 
 
 def _without_friction(values: EffectValues, beside: Beside) -> str | None:
     """Return why such values are those of an `asymmetry`; None where a friction tells the two apart."""
-    if np.max(np.abs(values["alpha_C"])) * max(beside.T0) > NOT_SEEN * beside.force:
+    if np.max(np.abs(values["alpha_C"])) * max(beside.T0) > VISIBLE * beside.force:
         return None
     return "the same as asymmetry: there is no friction that it could leave as it is"
 
@@ -28,7 +24,7 @@ def _without_friction(values: EffectValues, beside: Beside) -> str | None:
 def _beside_a_constant(values: EffectValues, beside: Beside) -> str | None:
     """Return `asymmetry` where a constant force beside one T0 makes one of the other; None elsewhere."""
     apart = np.max(np.abs(values["alpha_C"])) * np.ptp(beside.T0)
-    return "asymmetry" if beside.static and apart < NOT_SEEN * beside.force else None
+    return "asymmetry" if beside.static and apart < VISIBLE * beside.force else None
 
 
 EFFECT = Effect(
