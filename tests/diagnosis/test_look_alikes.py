@@ -275,8 +275,9 @@ def test_damping_that_differs_between_the_directions_is_told_from_all_that_diffe
     assert value.value == pytest.approx(alpha, abs=0.005)
 
 
-def test_without_friction_both_kinds_of_asymmetry_are_one(rng: np.random.Generator) -> None:
-    viscous = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=2500.0, k_N_per_m=3e5),))
+@pytest.mark.parametrize("stiffness", [3e5, np.inf])
+def test_without_friction_both_kinds_of_asymmetry_are_one(stiffness: float, rng: np.random.Generator) -> None:
+    viscous = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=2500.0, k_N_per_m=stiffness),))
     records = sines(viscous.with_effect("asymmetry", {"alpha": 0.15}), rng, (0.0,), tests=SEVERAL, cycles=4, noise=5e-3)
     told = diagnosed(records).diagnosis
     assert (told.verdict, told.effects, told.rivals) == ("named", ("asymmetry",), ()), told.reason

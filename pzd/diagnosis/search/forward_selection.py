@@ -34,6 +34,7 @@ from pzd.diagnosis.search.candidates import (
     nearly_as_good,
     per_voltage_candidates,
 )
+from pzd.diagnosis.search.determination import contradiction
 from pzd.identification.knee import fitted_knee_damper
 from pzd.record import Record
 
@@ -401,7 +402,9 @@ class _ForwardSelection:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
-            step = SelectionStep(finished, chosen.effect, rejected=refused)
+            force = self.evidence.whole.scales.force
+            none = {c.effect for c in tried if contradiction(c.fitted.damper, c.effect, force)}
+            step = SelectionStep(finished, chosen.effect, rejected=refused | none)
             self.steps.append(replace(step, rivals=acceptance.rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
